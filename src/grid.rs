@@ -1,0 +1,229 @@
+//! The grid: 64×64 samples of a chart, what of it is known, and the units the network sees.
+//! Cell (i, j) has its centre at uv ((i + ½)/64, (j + ½)/64); u runs right along i, v up along j; index j·64 + i.
+//! No meshes, no network, no constraints: those rooms read and write grids.
+
+use crate::mesh::{Vec2, Vec3};
+
+/// Cells along one side of a grid.
+pub const SIDE: usize = 64;
+/// Cells of a grid.
+pub const CELLS: usize = SIDE * SIDE;
+
+/// Positions sampled on the chart's unit square, in scene space.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid {
+    /// One position per cell; meaningless where `known` is false.
+    pub positions: Vec<Vec3>,
+    /// Whether the scan covers the cell's centre; false in holes and outside the region alike.
+    pub known: Vec<bool>,
+}
+
+/// A grid in the network's units: mean of the known cells at the origin, mean spacing of neighbouring known cells 1/64.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NormalGrid {
+    /// One position per cell; zero where unknown.
+    pub positions: Vec<[f32; 3]>,
+    /// 1 where the position is given, 0 where it is to be filled; values between are soft.
+    pub known: Vec<f32>,
+}
+
+/// The similarity between scene space and the network's units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Normalisation {
+    /// Mean of the known positions, scene space.
+    pub centre: Vec3,
+    /// Scene units per network unit: 64 × the mean spacing of known neighbours.
+    pub scale: f64,
+}
+
+/// Mean and variance of the distance between 4-neighbours, in the units of the positions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spacing {
+    /// Mean distance.
+    pub mean: f64,
+    /// Variance of the distance.
+    pub variance: f64,
+    /// How many pairs were measured.
+    pub pairs: usize,
+}
+
+/// The index of cell (i, j).
+pub fn cell_index(i: usize, j: usize) -> usize {
+    j * SIDE + i
+}
+
+/// The uv of the centre of a cell given by its index.
+pub fn cell_centre(index: usize) -> Vec2 {
+    let half = 0.5 / SIDE as f64;
+    Vec2::new(
+        (index % SIDE) as f64 / SIDE as f64 + half,
+        (index / SIDE) as f64 / SIDE as f64 + half,
+    )
+}
+
+/// The cell that a uv lies in; uvs outside the unit square go to the nearest cell.
+pub fn cell_at(uv: Vec2) -> usize {
+    let along = |x: f64| ((x * SIDE as f64).floor().max(0.0) as usize).min(SIDE - 1);
+    cell_index(along(uv.x), along(uv.y))
+}
+
+/// The index pairs of all 4-neighbours, right ones before upper ones.
+pub fn neighbour_pairs() -> impl Iterator<Item = (usize, usize)> {
+    let right = (0..CELLS).filter(|k| k % SIDE + 1 < SIDE).map(|k| (k, k + 1));
+    let upper = (0..CELLS - SIDE).map(|k| (k, k + SIDE));
+    right.chain(upper)
+}
+
+/// Spacing of the 4-neighbours that `counted` admits.
+pub fn spacing(positions: &[Vec3], counted: impl Fn(usize, usize) -> bool) -> Spacing {
+    let (mut sum, mut squares, mut pairs) = (0.0, 0.0, 0usize);
+    for (a, b) in neighbour_pairs().filter(|&(a, b)| counted(a, b)) {
+        let d = (positions[a] - positions[b]).norm();
+        sum += d;
+        squares += d * d;
+        pairs += 1;
+    }
+    let n = pairs.max(1) as f64;
+    let mean = sum / n;
+    Spacing { mean, variance: (squares / n - mean * mean).max(0.0), pairs }
+}
+
+impl Grid {
+    /// A grid that knows nothing.
+    pub fn unknown() -> Self {
+        Grid { positions: vec![Vec3::zeros(); CELLS], known: vec![false; CELLS] }
+    }
+
+    /// Number of known cells.
+    pub fn known_count(&self) -> usize {
+        self.known.iter().filter(|k| **k).count()
+    }
+
+    /// Shift and scale that bring this grid to the network's units; `None` when no two neighbouring cells are known
+    /// or all known cells coincide.
+    pub fn normalisation(&self) -> Option<Normalisation> {
+        let spacing = spacing(&self.positions, |a, b| self.known[a] && self.known[b]);
+        if spacing.pairs == 0 || spacing.mean <= 0.0 || !spacing.mean.is_finite() {
+            return None;
+        }
+        let known = self.positions.iter().zip(&self.known).filter(|(_, k)| **k);
+        let centre = known.fold(Vec3::zeros(), |sum, (p, _)| sum + p) / self.known_count() as f64;
+        Some(Normalisation { centre, scale: spacing.mean * SIDE as f64 })
+    }
+
+    /// This grid in the network's units.
+    pub fn normalised(&self, by: &Normalisation) -> NormalGrid {
+        let positions = self
+            .positions
+            .iter()
+            .zip(&self.known)
+            .map(|(p, known)| if *known { by.to_network(p) } else { [0.0; 3] })
+            .collect();
+        NormalGrid { positions, known: self.known.iter().map(|k| f32::from(u8::from(*k))).collect() }
+    }
+
+    /// Positions of all cells: the scan's where known, `predicted` (network's units) elsewhere.
+    pub fn filled(&self, predicted: &[[f32; 3]], by: &Normalisation) -> Vec<Vec3> {
+        self.positions
+            .iter()
+            .zip(&self.known)
+            .zip(predicted)
+            .map(|((p, known), q)| if *known { *p } else { by.to_scene(q) })
+            .collect()
+    }
+}
+
+impl Normalisation {
+    /// A scene position in the network's units.
+    pub fn to_network(&self, p: &Vec3) -> [f32; 3] {
+        let q = (p - self.centre) / self.scale;
+        [q.x as f32, q.y as f32, q.z as f32]
+    }
+
+    /// A position in the network's units, in scene space.
+    pub fn to_scene(&self, q: &[f32; 3]) -> Vec3 {
+        Vec3::new(q[0].into(), q[1].into(), q[2].into()) * self.scale + self.centre
+    }
+}
+
+/// Bicubic (Catmull–Rom) evaluation of per-cell positions at a uv; beyond the outermost cell centres it extrapolates linearly.
+pub fn evaluate(positions: &[Vec3], uv: Vec2) -> Vec3 {
+    let (wu, iu) = catmull_rom(uv.x);
+    let (wv, iv) = catmull_rom(uv.y);
+    let mut sum = Vec3::zeros();
+    for (b, j) in iv.iter().enumerate() {
+        for (a, i) in iu.iter().enumerate() {
+            sum += positions[cell_index(*i, *j)] * (wu[a] * wv[b]);
+        }
+    }
+    sum
+}
+
+/// Weights and cells of the four samples around `x` along one axis. Within half a cell of the border, where a neighbour is missing,
+/// the two nearest cells interpolate linearly.
+fn catmull_rom(x: f64) -> ([f64; 4], [usize; 4]) {
+    let s = x * SIDE as f64 - 0.5;
+    let base = (s.floor().max(0.0) as usize).min(SIDE - 2);
+    let t = s - base as f64;
+    if base == 0 || base + 2 >= SIDE {
+        return ([0.0, 1.0 - t, t, 0.0], [base, base, base + 1, base + 1]);
+    }
+    let (t2, t3) = (t * t, t * t * t);
+    let weights = [
+        0.5 * (-t3 + 2.0 * t2 - t),
+        0.5 * (3.0 * t3 - 5.0 * t2 + 2.0),
+        0.5 * (-3.0 * t3 + 4.0 * t2 + t),
+        0.5 * (t3 - t2),
+    ];
+    (weights, [base - 1, base, base + 1, base + 2])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn plane(a: Vec3, b: Vec3, c: Vec3) -> Vec<Vec3> {
+        (0..CELLS).map(|k| cell_centre(k)).map(|uv| a + b * uv.x + c * uv.y).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn evaluation_reproduces_an_affine_sheet(u in 0.0..1.0f64, v in 0.0..1.0f64) {
+            let (a, b, c) = (Vec3::new(1.0, -2.0, 0.5), Vec3::new(3.0, 0.1, -1.0), Vec3::new(0.0, 2.0, 4.0));
+            let at = evaluate(&plane(a, b, c), Vec2::new(u, v));
+            prop_assert!((at - (a + b * u + c * v)).norm() < 1e-12);
+        }
+
+        #[test]
+        fn normalisation_is_undone_exactly_enough(scale in 1e-3..1e3f64, shift in -1e4..1e4f64) {
+            let mut grid = Grid::unknown();
+            grid.positions = plane(Vec3::repeat(shift), Vec3::x() * scale, Vec3::z() * scale);
+            grid.known = (0..CELLS).map(|k| k % 7 != 3).collect();
+            let by = grid.normalisation().unwrap();
+            let normal = grid.normalised(&by);
+            for k in (0..CELLS).filter(|k| grid.known[*k]) {
+                let back = by.to_scene(&normal.positions[k]);
+                prop_assert!((back - grid.positions[k]).norm() <= 1e-6 * by.scale);
+            }
+            let q: Vec<Vec3> = normal.positions.iter().map(|p| Vec3::new(p[0].into(), p[1].into(), p[2].into())).collect();
+            let mean = spacing(&q, |a, b| grid.known[a] && grid.known[b]).mean;
+            prop_assert!((mean * 64.0 - 1.0).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn cells_and_uvs_agree() {
+        for k in [0, 63, 64, 2080, CELLS - 1] {
+            assert_eq!(cell_at(cell_centre(k)), k);
+        }
+        assert_eq!(cell_at(Vec2::new(-1.0, 2.0)), cell_index(0, SIDE - 1));
+    }
+
+    #[test]
+    fn an_empty_or_collapsed_grid_has_no_normalisation() {
+        assert_eq!(Grid::unknown().normalisation(), None);
+        let collapsed = Grid { positions: vec![Vec3::x(); CELLS], known: vec![true; CELLS] };
+        assert_eq!(collapsed.normalisation(), None);
+    }
+}

@@ -1,0 +1,19 @@
+//! darn mends holes in scanned fabric: a glTF scan goes in, the same scan with its holes filled by plausible cloth comes out.
+//!
+//! The way of the data: [`scan`] → [`mesh`] → [`flatten`] → [`grid`] → [`net`] → [`patch`] → [`scan`]; [`mend`] walks it,
+//! [`serve`] offers it over HTTP and gRPC. [`scarffolds`] and [`train`] make the weights.
+
+#![forbid(unsafe_code)]
+
+pub mod contract;
+pub mod flatten;
+pub mod grid;
+pub mod mend;
+pub mod mesh;
+pub mod net;
+pub mod patch;
+pub mod render;
+pub mod scan;
+pub mod scarffolds;
+pub mod serve;
+pub mod train;
