@@ -1,0 +1,291 @@
+//! Where a surface cuts through itself: an R-tree finds pairs of faces, exact predicates judge them.
+
+use robust::{Coord, Coord3D, orient2d, orient3d};
+use rstar::primitives::{GeomWithData, Rectangle};
+use rstar::{AABB, Envelope, RTree, RTreeObject};
+
+use super::{TriMesh, Vec3};
+
+/// The box of a face, and the face.
+type FaceBox = GeomWithData<Rectangle<[f64; 3]>, u32>;
+
+/// All pairs of faces `(f, g)`, `f < g`, that cut each other, ascending.
+///
+/// Judged exactly on the given coordinates (Shewchuk's predicates). Faces that share one corner position count when they cut away from it;
+/// faces that share two do not count, even folded flat onto each other. In one plane, faces count when they overlap in an area. Elsewhere an edge
+/// must pass from one side of the other face's plane to the other: a corner that merely touches a face is no cut, two edges that cross in a
+/// point are. Faces with a position that is not finite are left out. O(n log n + pairs of overlapping boxes).
+pub fn self_intersections(mesh: &TriMesh) -> Vec<(u32, u32)> {
+    let boxes = (0..mesh.faces.len() as u32).filter_map(|f| face_box(mesh, f));
+    let tree = RTree::bulk_load(boxes.collect());
+    let mut pairs: Vec<(u32, u32)> = tree
+        .intersection_candidates_with_other_tree(&tree)
+        .map(|(f, g)| (f.data, g.data))
+        .filter(|&(f, g)| f < g && cut(mesh, f, g))
+        .collect();
+    pairs.sort_unstable();
+    pairs
+}
+
+/// Those pairs of [`self_intersections`] with at least one side in `faces` (each below `mesh.faces.len()`, others are ignored).
+///
+/// For a patch in a large scan: beyond the patch's bounding box it costs one comparison a face.
+pub fn intersections_with(mesh: &TriMesh, faces: &[u32]) -> Vec<(u32, u32)> {
+    let known = faces.iter().filter(|&&f| (f as usize) < mesh.faces.len());
+    let asked: Vec<FaceBox> = known.filter_map(|&f| face_box(mesh, f)).collect();
+    let mut bounds = AABB::new_empty();
+    for boxed in &asked {
+        bounds.merge(&boxed.envelope());
+    }
+    let near = (0..mesh.faces.len() as u32).filter_map(|f| face_box(mesh, f));
+    let tree = RTree::bulk_load(near.filter(|b| b.envelope().intersects(&bounds)).collect());
+    let mut pairs = Vec::new();
+    for boxed in &asked {
+        let f = boxed.data;
+        let near = tree.locate_in_envelope_intersecting(&boxed.envelope());
+        pairs.extend(
+            near.map(|g| (f.min(g.data), f.max(g.data)))
+                .filter(|&(f, g)| f != g),
+        );
+    }
+    pairs.sort_unstable();
+    pairs.dedup();
+    pairs.retain(|&(f, g)| cut(mesh, f, g));
+    pairs
+}
+
+fn face_box(mesh: &TriMesh, face: u32) -> Option<FaceBox> {
+    let corners = mesh.triangle(face as usize);
+    corners
+        .iter()
+        .all(|p| p.iter().all(|c| c.is_finite()))
+        .then(|| {
+            let bounds = AABB::from_points(&corners.map(<[f64; 3]>::from));
+            GeomWithData::new(Rectangle::from_aabb(bounds), face)
+        })
+}
+
+/// Whether two faces cut each other; see [`self_intersections`] for what counts.
+fn cut(mesh: &TriMesh, f: u32, g: u32) -> bool {
+    let (mut a, mut b) = (mesh.triangle(f as usize), mesh.triangle(g as usize));
+    let shared: Vec<(usize, usize)> = (0..9)
+        .map(|i| (i / 3, i % 3))
+        .filter(|&(i, j)| a[i] == b[j])
+        .collect();
+    match shared[..] {
+        [] => {}
+        [(i, j)] => {
+            a.rotate_left(i);
+            b.rotate_left(j);
+        }
+        _ => return false,
+    }
+    let a_sides = a.map(|p| side(&b, p));
+    let b_sides = b.map(|p| side(&a, p));
+    if a_sides == [0, 0, 0] || b_sides == [0, 0, 0] {
+        return overlap_in_plane(&a, &b);
+    }
+    // A shared corner comes first now; edges at it lie on one side of it or touch, only the one opposite can pass through.
+    let edges = if shared.is_empty() { 0..3 } else { 1..2 };
+    edges.into_iter().any(|k| {
+        let n = (k + 1) % 3;
+        (a_sides[k] * a_sides[n] < 0 && line_meets(&b, a[k], a[n]))
+            || (b_sides[k] * b_sides[n] < 0 && line_meets(&a, b[k], b[n]))
+    })
+}
+
+/// On which side of a face's plane a point lies: −1, 0 or 1.
+fn side(face: &[Vec3; 3], p: Vec3) -> i8 {
+    volume(face[0], face[1], face[2], p)
+}
+
+/// Sign of the volume of a tetrahedron.
+fn volume(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> i8 {
+    let [a, b, c, d] = [a, b, c, d].map(|p| Coord3D {
+        x: p.x,
+        y: p.y,
+        z: p.z,
+    });
+    sign(orient3d(a, b, c, d))
+}
+
+fn sign(x: f64) -> i8 {
+    i8::from(x > 0.0) - i8::from(x < 0.0)
+}
+
+/// Whether the line through `p` and `q` (not in the face's plane) meets the closed face.
+fn line_meets(face: &[Vec3; 3], p: Vec3, q: Vec3) -> bool {
+    let turns = [0, 1, 2].map(|k| volume(p, q, face[k], face[(k + 1) % 3]));
+    turns.iter().all(|&t| t >= 0) || turns.iter().all(|&t| t <= 0)
+}
+
+/// Whether two triangles in one plane share an area: no side of either has the other wholly behind it.
+fn overlap_in_plane(a: &[Vec3; 3], b: &[Vec3; 3]) -> bool {
+    let normal =
+        (a[1] - a[0]).cross(&(a[2] - a[0])).abs() + (b[1] - b[0]).cross(&(b[2] - b[0])).abs();
+    let dropped = normal.imax();
+    let flat = |p: &Vec3| Coord {
+        x: p[(dropped + 1) % 3],
+        y: p[(dropped + 2) % 3],
+    };
+    let (a, b) = (a.each_ref().map(flat), b.each_ref().map(flat));
+    let separates = |t: &[Coord<f64>; 3], other: &[Coord<f64>; 3]| {
+        let way = sign(orient2d(t[0], t[1], t[2]));
+        // A triangle without area separates itself from everything.
+        (0..3).any(|k| {
+            other
+                .iter()
+                .all(|&p| sign(orient2d(t[k], t[(k + 1) % 3], p)) * way <= 0)
+        })
+    };
+    !separates(&a, &b) && !separates(&b, &a)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::mesh::shapes::{holed_sheet, shaken, sheet, together, tube};
+    use crate::mesh::weld::weld;
+
+    fn pair(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> TriMesh {
+        TriMesh {
+            positions: a.into_iter().chain(b).map(Vec3::from).collect(),
+            faces: vec![[0, 1, 2], [3, 4, 5]],
+        }
+    }
+
+    const FLOOR: [[f64; 3]; 3] = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+
+    fn cuts_floor(other: [[f64; 3]; 3]) -> bool {
+        let mesh = pair(FLOOR, other);
+        let reversed = pair(other, FLOOR);
+        let found = self_intersections(&mesh);
+        assert_eq!(
+            found,
+            self_intersections(&reversed),
+            "the order of faces does not matter"
+        );
+        assert_eq!(found, intersections_with(&mesh, &[1]));
+        !found.is_empty()
+    }
+
+    #[test]
+    fn a_face_through_another_is_found_and_one_beside_it_is_not() {
+        assert!(cuts_floor([
+            [1.0, 1.0, -1.0],
+            [1.0, 1.0, 1.0],
+            [9.0, 9.0, 0.5]
+        ]));
+        assert!(!cuts_floor([
+            [3.0, 3.0, -1.0],
+            [3.0, 3.0, 1.0],
+            [9.0, 9.0, 0.5]
+        ]));
+        assert!(!cuts_floor([
+            [1.0, 1.0, 0.1],
+            [1.0, 1.0, 1.0],
+            [9.0, 9.0, 0.5]
+        ]));
+    }
+
+    #[test]
+    fn a_touch_is_no_cut() {
+        assert!(!cuts_floor([
+            [1.0, 1.0, 0.0],
+            [1.0, 2.0, 1.0],
+            [2.0, 1.0, 1.0]
+        ]));
+        assert!(!cuts_floor([
+            [1.0, 1.0, 0.0],
+            [1.0, 2.0, 0.0],
+            [2.0, 1.0, 1.0]
+        ]));
+        assert!(cuts_floor([
+            [1.0, 1.0, 0.0],
+            [1.0, 2.0, -1.0],
+            [2.0, 1.0, 1.0]
+        ]));
+    }
+
+    #[test]
+    fn in_a_plane_only_overlap_counts() {
+        assert!(cuts_floor([
+            [1.0, 1.0, 0.0],
+            [9.0, 1.0, 0.0],
+            [9.0, 9.0, 0.0]
+        ]));
+        assert!(!cuts_floor([
+            [4.0, 0.0, 0.0],
+            [9.0, 9.0, 0.0],
+            [0.0, 4.0, 0.0]
+        ]));
+        assert!(!cuts_floor([
+            [2.0, 2.0, 0.0],
+            [9.0, 2.0, 0.0],
+            [9.0, 9.0, 0.0]
+        ]));
+    }
+
+    #[test]
+    fn faces_with_a_common_corner_count_when_they_cut_elsewhere() {
+        assert!(cuts_floor([
+            [0.0, 0.0, 0.0],
+            [1.0, 1.0, -1.0],
+            [1.0, 1.0, 1.0]
+        ]));
+        assert!(!cuts_floor([
+            [0.0, 0.0, 0.0],
+            [-1.0, -1.0, -1.0],
+            [-1.0, -1.0, 1.0]
+        ]));
+        assert!(!cuts_floor([
+            [0.0, 0.0, 0.0],
+            [4.0, 0.0, 0.0],
+            [1.0, 1.0, 0.0]
+        ]));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        #[test]
+        fn smooth_surfaces_do_not_cut_themselves(n in 4usize..16, noise in 0.0..0.1f64, seed: u64) {
+            prop_assert_eq!(self_intersections(&holed_sheet(n, 0.2)), []);
+            prop_assert_eq!(self_intersections(&shaken(&weld(&tube(n, |_, _| true)).mesh, noise / n as f64, seed)), []);
+        }
+
+        #[test]
+        fn the_tree_finds_what_all_pairs_find(seed: u64, n in 2usize..6) {
+            let tangle = shaken(&sheet(n, |_, _| true, |u, v| Vec3::new(u, v, 0.0)), 0.5, seed);
+            let count = tangle.faces.len() as u32;
+            let pairs = (0..count).flat_map(|f| (f + 1..count).map(move |g| (f, g)));
+            let expected: Vec<(u32, u32)> = pairs.filter(|&(f, g)| cut(&tangle, f, g)).collect();
+            let few = [0, count / 2];
+            let of_few: Vec<_> = expected.iter().copied().filter(|p| few.contains(&p.0) || few.contains(&p.1)).collect();
+            prop_assert_eq!(intersections_with(&tangle, &few), of_few);
+            prop_assert_eq!(self_intersections(&tangle), expected);
+        }
+
+        #[test]
+        fn crossing_sheets_cut_along_a_line(n in 3usize..12) {
+            let floor = sheet(n, |_, _| true, |u, v| Vec3::new(u, v, 0.0));
+            let wall = sheet(n, |_, _| true, |u, v| Vec3::new(0.47, 0.9 * u + 0.03, 1.01 * v - 0.52));
+            let found = self_intersections(&together(&floor, &wall));
+            prop_assert!(found.len() >= 2 * n - 2, "{}", found.len());
+            let faces = floor.faces.len() as u32;
+            prop_assert!(found.iter().all(|&(f, g)| f < faces && g >= faces));
+        }
+    }
+
+    #[test]
+    fn positions_that_are_not_numbers_are_left_out() {
+        let broken = pair(
+            FLOOR,
+            [[1.0, 1.0, -1.0], [1.0, f64::NAN, 1.0], [9.0, 9.0, 0.5]],
+        );
+        assert_eq!(self_intersections(&broken), []);
+        assert_eq!(intersections_with(&broken, &[0, 1, 5]), []);
+    }
+}

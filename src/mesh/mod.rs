@@ -1,0 +1,50 @@
+//! Triangle meshes as plain arrays: welding, topology, boundary loops, regions, self-intersection, curvature.
+//! Small free functions on `TriMesh`, one idea a file; everything is in scene units and f64.
+//! No glTF, no charts, no grids, no files: those rooms stand on this one.
+
+pub mod curvature;
+pub mod geodesic;
+mod growth;
+pub mod intersect;
+pub mod loops;
+pub mod nearest;
+pub mod region;
+pub mod topology;
+pub mod weld;
+
+#[cfg(test)]
+pub(crate) mod shapes;
+
+/// A point or direction in the plane of a chart.
+pub type Vec2 = nalgebra::Vector2<f64>;
+/// A point or direction in scene space.
+pub type Vec3 = nalgebra::Vector3<f64>;
+
+/// An indexed triangle mesh; faces are counter-clockwise seen from outside.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TriMesh {
+    /// Vertex positions, scene space.
+    pub positions: Vec<Vec3>,
+    /// Vertex indices of every triangle; each is below `positions.len()`.
+    pub faces: Vec<[u32; 3]>,
+}
+
+impl TriMesh {
+    /// The three corner positions of a face.
+    ///
+    /// # Panics
+    /// When `face` or one of its vertices does not exist; welded meshes and regions keep both in range.
+    pub fn triangle(&self, face: usize) -> [Vec3; 3] {
+        self.faces[face].map(|v| self.positions[v as usize])
+    }
+
+    /// The interior angle at `corner` (0..3) of a face, radians in `[0, π]`; 0 for a corner with a zero-length side.
+    pub fn corner_angle(&self, face: usize, corner: usize) -> f64 {
+        let p = self.triangle(face);
+        let (a, b) = (
+            p[(corner + 1) % 3] - p[corner],
+            p[(corner + 2) % 3] - p[corner],
+        );
+        a.cross(&b).norm().atan2(a.dot(&b))
+    }
+}

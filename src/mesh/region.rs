@@ -1,0 +1,280 @@
+//! The cloth around a hole: a piece of the mesh that is a disk once its holes are closed.
+
+use super::TriMesh;
+use super::growth::Growth;
+use super::loops::BoundaryLoop;
+use super::topology::Topology;
+
+/// A piece of the mesh around one hole, as a mesh of its own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Region {
+    /// The piece; every boundary vertex lies on exactly one of its loops.
+    pub mesh: TriMesh,
+    /// Local vertex -> vertex of the whole mesh. A vertex where the piece touches itself only in a point appears twice.
+    pub vertices: Vec<u32>,
+    /// Local face -> face of the whole mesh, ascending.
+    pub faces: Vec<u32>,
+    /// Local vertices of the hole asked for, in its loop's order.
+    pub rim: Vec<u32>,
+    /// The other holes that lie wholly inside, each along its half-edges.
+    pub holes: Vec<Vec<u32>>,
+    /// The one outer loop, along its half-edges; may follow loops of the whole mesh where the piece is cut by them.
+    pub outer: Vec<u32>,
+    /// The reach that was used, scene units: the one asked for unless that was less than three edges, more than there is, or no disk.
+    pub reach: f64,
+}
+
+/// Why there is no region around a rim.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RegionError {
+    /// The rim asked for is not among the loops.
+    #[error("loop {rim} does not exist; the mesh has {loops} boundary loop(s)")]
+    NoSuchLoop {
+        /// The index asked for.
+        rim: usize,
+        /// How many loops there are.
+        loops: usize,
+    },
+    /// Even three edges wide the cloth round the rim is no disk.
+    #[error(
+        "the cloth within {reach:.4} of loop {rim} has {handles} handle(s) and {outer} outer loop(s); \
+         it must be a disk with one outer loop once its holes are closed"
+    )]
+    NotADisk {
+        /// Id of the rim.
+        rim: u32,
+        /// Handles (genus) of the piece.
+        handles: usize,
+        /// Loops that are not holes; should be 1.
+        outer: usize,
+        /// The smallest reach tried, scene units.
+        reach: f64,
+    },
+}
+
+/// What the reach is multiplied by when the piece is no disk.
+const SHRINK: f64 = 0.8;
+/// The cloth within geodesic distance `reach` (scene units; infinite for all there is) of loop `rim`, made a disk.
+///
+/// Pieces that the region encloses are filled back in when they are shallow, islands are dropped. When what is left is
+/// not a disk once its holes are closed (it wraps round a sleeve, or meets itself behind a fold), the reach shrinks in steps down to about
+/// three edges, which is also the least it starts from. Other hole loops wholly inside become `holes`; those the border cuts become part of `outer`.
+///
+/// # Errors
+/// When the rim does not exist, or no reach gives a disk.
+pub fn grow(
+    mesh: &TriMesh,
+    topology: &Topology,
+    loops: &[BoundaryLoop],
+    rim: usize,
+    reach: f64,
+) -> Result<Region, RegionError> {
+    let Some(asked) = loops.get(rim) else {
+        return Err(RegionError::NoSuchLoop {
+            rim,
+            loops: loops.len(),
+        });
+    };
+    let growth = Growth::new(mesh, topology, loops, asked, reach);
+    let narrowest = growth.narrowest;
+    let farthest = growth
+        .distance
+        .iter()
+        .copied()
+        .filter(|d| d.is_finite())
+        .fold(0.0, f64::max);
+    let mut reach = reach.min(farthest);
+    loop {
+        reach = reach.max(narrowest);
+        let (handles, outer) = match growth.cut(reach) {
+            Ok(region) => return Ok(region),
+            Err(shape) => shape,
+        };
+        if reach <= narrowest {
+            return Err(RegionError::NotADisk {
+                rim: asked.id,
+                handles,
+                outer,
+                reach,
+            });
+        }
+        reach *= SHRINK;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::mesh::Vec3;
+    use crate::mesh::loops::{LoopKind, boundary_loops};
+    use crate::mesh::shapes::{holed_sheet, shaken, sheet, tube};
+    use crate::mesh::weld::weld;
+
+    struct Whole {
+        mesh: TriMesh,
+        topology: Topology,
+        loops: Vec<BoundaryLoop>,
+    }
+
+    impl Whole {
+        fn new(soup: &TriMesh) -> Self {
+            let mesh = weld(soup).mesh;
+            let topology = Topology::new(&mesh);
+            let loops = boundary_loops(&mesh, &topology);
+            Self {
+                mesh,
+                topology,
+                loops,
+            }
+        }
+
+        fn hole(&self) -> usize {
+            self.loops
+                .iter()
+                .position(|l| l.kind == LoopKind::Hole)
+                .expect("the shape has a hole")
+        }
+
+        fn grow(&self, reach: f64) -> Result<Region, RegionError> {
+            grow(&self.mesh, &self.topology, &self.loops, self.hole(), reach)
+        }
+    }
+
+    /// What must hold of every region: a manifold disk with holes whose rim and faces are the whole mesh's own.
+    fn check(whole: &Whole, region: &Region) -> Result<(), TestCaseError> {
+        let rim: Vec<u32> = region
+            .rim
+            .iter()
+            .map(|&v| region.vertices[v as usize])
+            .collect();
+        prop_assert_eq!(&rim, &whole.loops[whole.hole()].vertices);
+        for (l, &f) in region.faces.iter().enumerate() {
+            prop_assert_eq!(
+                region.mesh.faces[l].map(|v| region.vertices[v as usize]),
+                whole.mesh.faces[f as usize]
+            );
+        }
+        let topology = Topology::new(&region.mesh);
+        prop_assert_eq!(topology.components, 1);
+        let mut found: Vec<u32> = boundary_loops(&region.mesh, &topology)
+            .into_iter()
+            .flat_map(|l| l.vertices)
+            .collect();
+        let loops = 2 + region.holes.len();
+        let mut told: Vec<u32> = region
+            .holes
+            .iter()
+            .flatten()
+            .chain(&region.rim)
+            .chain(&region.outer)
+            .copied()
+            .collect();
+        found.sort_unstable();
+        told.sort_unstable();
+        prop_assert_eq!(&found, &told);
+        told.dedup();
+        prop_assert_eq!(told.len(), found.len());
+        let edges = topology.edges().count();
+        let euler = region.mesh.positions.len() as i64 - edges as i64 + region.faces.len() as i64;
+        prop_assert_eq!(euler, 2 - loops as i64);
+        Ok(())
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+
+        #[test]
+        fn regions_of_rough_cloth_are_disks_with_holes(
+            n in 12usize..28, reach in 0.0..1.0f64, noise in 0.0..0.4f64, seed: u64,
+            moths in prop::collection::vec((0.05..0.95f64, 0.05..0.95f64, 0.02..0.08f64), 0..6),
+        ) {
+            let keep = |u: f64, v: f64| {
+                (u - 0.5).hypot(v - 0.5) > 0.2 && moths.iter().all(|m| (u - m.0).hypot(v - m.1) > m.2)
+            };
+            let bumps = |u: f64, v: f64| Vec3::new(u, v, 0.15 * (9.0 * u).sin() * (7.0 * v).cos());
+            let whole = Whole::new(&shaken(&sheet(n, keep, bumps), noise / n as f64, seed));
+            let rough = whole.grow(reach);
+            prop_assert!(rough.is_ok(), "{:?}", rough.map(|_| ()));
+            check(&whole, &rough.expect("a region"))?;
+        }
+
+        #[test]
+        fn a_region_of_a_flat_ring_is_the_band(n in 20usize..40, hole in 0.1..0.2f64, reach in 0.2..0.3f64) {
+            let whole = Whole::new(&holed_sheet(n, hole));
+            let region = whole.grow(reach).expect("a flat ring");
+            check(&whole, &region)?;
+            prop_assert_eq!(region.reach, reach);
+            prop_assert!(region.holes.is_empty());
+            let rim = &whole.loops[whole.hole()];
+            let outside = |p: &Vec3| crate::mesh::nearest::distance_to_loop(&whole.mesh, rim, p);
+            let edge = 1.5 / n as f64;
+            for p in &region.mesh.positions {
+                prop_assert!(outside(p) < reach + 1e-9, "{} {reach}", outside(p));
+            }
+            for &v in &region.outer {
+                let p = &region.mesh.positions[v as usize];
+                let at_the_border = [p.x, p.y].iter().any(|c| *c == 0.0 || *c == 1.0);
+                prop_assert!(at_the_border || outside(p) > 0.9 * reach - 2.0 * edge);
+            }
+        }
+    }
+
+    #[test]
+    fn all_of_a_sheet_is_within_infinite_reach() {
+        let whole = Whole::new(&holed_sheet(12, 0.2));
+        let region = whole.grow(f64::INFINITY).expect("a flat ring");
+        assert_eq!(region.faces.len(), whole.mesh.faces.len());
+        let outer: Vec<u32> = region
+            .outer
+            .iter()
+            .map(|&v| region.vertices[v as usize])
+            .collect();
+        assert_eq!(
+            outer,
+            whole
+                .loops
+                .iter()
+                .find(|l| l.kind == LoopKind::Outer)
+                .expect("a border")
+                .vertices
+        );
+    }
+
+    #[test]
+    fn a_band_round_a_tube_shrinks_to_a_disk() {
+        let whole = Whole::new(&tube(40, |u, v| {
+            (u - 0.5).abs() > 0.1 || (v - 0.5).abs() > 0.06
+        }));
+        let region = whole.grow(3.5).expect("cloth round a small hole");
+        assert!(region.reach < 3.1, "{}", region.reach);
+        assert!(check(&whole, &region).is_ok());
+    }
+
+    #[test]
+    fn a_hole_all_but_round_a_tube_is_refused_with_numbers() {
+        let whole = Whole::new(&tube(12, |u, v| {
+            !(0.05..0.95).contains(&u) || (v - 0.5).abs() > 0.06
+        }));
+        let refused = whole.grow(1.0);
+        assert!(
+            matches!(
+                refused,
+                Err(RegionError::NotADisk {
+                    handles: 0,
+                    outer: 2,
+                    ..
+                })
+            ),
+            "{refused:?}"
+        );
+    }
+
+    #[test]
+    fn a_loop_that_is_not_there_is_named() {
+        let whole = Whole::new(&holed_sheet(8, 0.2));
+        let missing = grow(&whole.mesh, &whole.topology, &whole.loops, 7, 1.0);
+        assert_eq!(missing, Err(RegionError::NoSuchLoop { rim: 7, loops: 2 }));
+    }
+}

@@ -1,0 +1,188 @@
+//! Welding: one vertex per exact position, then one vertex per sheet where sheets touch only in a point or an edge.
+
+use super::TriMesh;
+use super::topology::{corner_fans, pair_half_edges, places};
+
+/// A soup made into surfaces, and the way back.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Welded {
+    /// The welded mesh; vertices are numbered by first use in face order, none is unused.
+    pub mesh: TriMesh,
+    /// Welded face -> soup face, ascending; corner k of one is corner k of the other.
+    pub face_of: Vec<u32>,
+    /// Faces of the soup left out: two corners in one place, the same three places as an earlier face (whichever side it
+    /// shows), or an index out of range.
+    pub dropped: usize,
+}
+
+/// Welds `soup` by exact position (−0 equals 0) and splits bow-ties.
+///
+/// A vertex whose faces form several edge-connected fans becomes one vertex per fan, all in the same place, so every boundary
+/// vertex of the result lies on exactly one boundary loop. Faces are not joined across an edge where more than two meet or two
+/// run the same way (a sheet crossed by such an edge up to its border is slit there). The result depends on the order of faces only, not on how the soup numbered its vertices. Near linear.
+pub fn weld(soup: &TriMesh) -> Welded {
+    let place = places(soup);
+    let mut found = Vec::with_capacity(soup.faces.len());
+    for (f, face) in soup.faces.iter().enumerate() {
+        if let [Some(&a), Some(&b), Some(&c)] = face.map(|v| place.get(v as usize))
+            && a != b
+            && b != c
+            && c != a
+        {
+            let mut key = [a, b, c];
+            key.sort_unstable();
+            found.push((key, f as u32));
+        }
+    }
+    found.sort_unstable();
+    found.dedup_by_key(|face| face.0);
+    let mut face_of: Vec<u32> = found.into_iter().map(|face| face.1).collect();
+    face_of.sort_unstable();
+    let faces: Vec<[u32; 3]> = face_of
+        .iter()
+        .map(|&f| soup.faces[f as usize].map(|v| place[v as usize]))
+        .collect();
+    let (twin, _) = pair_half_edges(&faces, &place);
+    let (fan, fans) = corner_fans(&twin);
+    let mut positions = Vec::with_capacity(fans);
+    for (corner, &old) in faces.as_flattened().iter().enumerate() {
+        if fan[corner] as usize == positions.len() {
+            positions.push(soup.positions[old as usize]);
+        }
+    }
+    let dropped = soup.faces.len() - faces.len();
+    let (faces, _) = fan.as_chunks::<3>();
+    Welded {
+        mesh: TriMesh {
+            positions,
+            faces: faces.to_vec(),
+        },
+        face_of,
+        dropped,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::mesh::shapes::{exploded, shaken, sheet, shuffled, together};
+    use crate::mesh::topology::{NONE, Topology};
+    use crate::mesh::{Vec3, loops};
+
+    /// A bumpy sheet with squares missing at random: bow-ties, islands and holes of every sort.
+    fn moth_eaten() -> impl Strategy<Value = TriMesh> {
+        (
+            2usize..9,
+            any::<u64>(),
+            prop::collection::vec(prop::bool::weighted(0.7), 64),
+        )
+            .prop_map(|(n, seed, keep)| {
+                let square = |x: f64| (x * n as f64) as usize;
+                let flat = sheet(
+                    n,
+                    |u, v| keep[square(v) * 8 % 64 + square(u)],
+                    |u, v| Vec3::new(u, v, 0.0),
+                );
+                shaken(&flat, 0.02, seed)
+            })
+    }
+
+    proptest! {
+        #[test]
+        fn welding_twice_changes_nothing(soup in moth_eaten()) {
+            let once = weld(&exploded(&soup)).mesh;
+            let twice = weld(&once);
+            prop_assert_eq!(twice.mesh, once);
+            prop_assert_eq!(twice.dropped, 0);
+        }
+
+        #[test]
+        fn the_numbering_of_the_soup_does_not_matter(soup in moth_eaten(), seed: u64) {
+            let welded = weld(&soup);
+            prop_assert_eq!(&weld(&shuffled(&soup, seed)), &welded);
+            prop_assert_eq!(&weld(&exploded(&soup)), &welded);
+        }
+
+        #[test]
+        fn corners_keep_their_places(soup in moth_eaten()) {
+            let welded = weld(&soup);
+            for (f, &from) in welded.face_of.iter().enumerate() {
+                prop_assert_eq!(welded.mesh.triangle(f), soup.triangle(from as usize));
+            }
+        }
+
+        #[test]
+        fn every_boundary_vertex_lies_on_one_loop(soup in moth_eaten()) {
+            let mesh = weld(&soup).mesh;
+            let topology = Topology::new(&mesh);
+            let loops = loops::boundary_loops(&mesh, &topology);
+            let mut vertices: Vec<u32> = loops.iter().flat_map(|l| l.vertices.clone()).collect();
+            let count = vertices.len();
+            vertices.sort_unstable();
+            vertices.dedup();
+            prop_assert_eq!(vertices.len(), count);
+            prop_assert_eq!(count, topology.twin.iter().filter(|&&t| t == NONE).count());
+        }
+    }
+
+    #[test]
+    fn degenerate_duplicate_and_broken_faces_are_dropped() {
+        let (a, b, c, d) = (
+            Vec3::zeros(),
+            Vec3::x(),
+            Vec3::y(),
+            Vec3::new(1.0, 1.0, 0.0),
+        );
+        let minus = Vec3::new(-0.0, 0.0, -0.0);
+        let soup = TriMesh {
+            positions: vec![a, b, c, d, minus],
+            faces: vec![
+                [0, 1, 2],
+                [1, 2, 4],
+                [2, 4, 1],
+                [0, 4, 1],
+                [0, 1, 9],
+                [2, 1, 3],
+            ],
+        };
+        let welded = weld(&soup);
+        assert_eq!((welded.face_of, welded.dropped), (vec![0, 5], 4));
+        assert_eq!(welded.mesh.positions, [a, b, c, d]);
+    }
+
+    #[test]
+    fn a_fin_inside_a_sheet_comes_off_and_leaves_the_sheet_whole() {
+        let sheet = sheet(4, |_, _| true, |u, v| Vec3::new(u, v, 0.0));
+        let fin = TriMesh {
+            positions: vec![
+                Vec3::new(0.5, 0.5, 0.0),
+                Vec3::new(0.75, 0.5, 0.0),
+                Vec3::new(0.7, 0.5, 1.0),
+            ],
+            faces: vec![[0, 1, 2]],
+        };
+        let mesh = weld(&together(&sheet, &fin)).mesh;
+        let topology = Topology::new(&mesh);
+        assert_eq!(topology.components, 2);
+        assert_eq!(topology.non_manifold.len(), 1);
+        let loops = loops::boundary_loops(&mesh, &topology);
+        let named: Vec<_> = loops
+            .iter()
+            .map(|l| (l.vertices.len(), l.non_manifold))
+            .collect();
+        assert_eq!(named, [(16, false), (3, true)]);
+    }
+
+    #[test]
+    fn faces_that_run_the_same_way_are_not_joined() {
+        let soup = TriMesh {
+            positions: vec![Vec3::zeros(), Vec3::x(), Vec3::y(), -Vec3::y()],
+            faces: vec![[0, 1, 2], [0, 1, 3]],
+        };
+        let topology = Topology::new(&weld(&soup).mesh);
+        assert_eq!(topology.components, 2);
+        assert_eq!(topology.non_manifold, [0, 3]);
+    }
+}
