@@ -1,0 +1,160 @@
+//! The flip-free way out: symmetric Dirichlet energy by reweighted ARAP steps (SLIM; Rabinovich, Poranne, Panozzo, Sorkine-Hornung 2017).
+
+use nalgebra::Matrix2;
+
+use super::cholesky::Symmetric;
+use super::{FlattenError, RestTriangle};
+use crate::mesh::{TriMesh, Vec2};
+
+/// Most steps; each refactors a system twice the size of ARAP's.
+const STEPS: usize = 40;
+/// Steps end when one lowers the energy by less than this share.
+const GAIN: f64 = 1e-4;
+/// Share of the way to the first flip that a step may go.
+const SAFE: f64 = 0.8;
+/// Pull towards the point before the step, relative to the mean weight; keeps the system definite.
+const PROXIMAL: f64 = 1e-6;
+
+/// Minimises Σ_f A_f (‖J‖² + ‖J⁻¹‖²) from a start without flips; never flips a face. Returns the steps, too.
+pub fn minimise(mesh: &TriMesh, rest: &[RestTriangle], start: &[Vec2]) -> Result<(Vec<Vec2>, usize), FlattenError> {
+    let gradients: Vec<[Vec2; 3]> = rest.iter().map(RestTriangle::gradients).collect();
+    let cloth = Cloth { mesh, rest, gradients };
+    let mut flat = start.to_vec();
+    let mut energy = cloth.energy(&flat);
+    let mut steps = 0;
+    while steps < STEPS {
+        steps += 1;
+        let goal = cloth.step(&flat)?;
+        let direction: Vec<Vec2> = goal.iter().zip(&flat).map(|(g, p)| g - p).collect();
+        let mut length = (SAFE * cloth.first_flip(&flat, &direction)).min(1.0);
+        let before = energy;
+        for _ in 0..20 {
+            let tried: Vec<Vec2> = flat.iter().zip(&direction).map(|(p, d)| p + d * length).collect();
+            let reached = cloth.energy(&tried);
+            if reached < energy {
+                (flat, energy) = (tried, reached);
+                break;
+            }
+            length *= 0.5;
+        }
+        if before - energy <= GAIN * before {
+            break;
+        }
+    }
+    Ok((flat, steps))
+}
+
+struct Cloth<'a> {
+    mesh: &'a TriMesh,
+    rest: &'a [RestTriangle],
+    gradients: Vec<[Vec2; 3]>,
+}
+
+impl Cloth<'_> {
+    fn jacobian(&self, f: usize, flat: &[Vec2]) -> Matrix2<f64> {
+        let corners = self.mesh.faces[f].map(|v| flat[v as usize]);
+        (0..3).map(|k| corners[k] * self.gradients[f][k].transpose()).sum()
+    }
+
+    fn energy(&self, flat: &[Vec2]) -> f64 {
+        let of = |f: usize| {
+            let j = self.jacobian(f, flat);
+            let det = j.determinant();
+            if det <= 0.0 {
+                return f64::INFINITY;
+            }
+            let square = j.norm_squared();
+            self.rest[f].area * (square + square / (det * det))
+        };
+        (0..self.rest.len()).map(of).sum()
+    }
+
+    /// The minimiser of the quadratic proxy Σ A ‖W (J − R)‖² around `flat`.
+    fn step(&self, flat: &[Vec2]) -> Result<Vec<Vec2>, FlattenError> {
+        let singular = || FlattenError::Singular { stage: "symmetric Dirichlet", vertices: flat.len() };
+        let mut matrix = Symmetric::zero(2 * flat.len());
+        let mut rhs = vec![[0.0]; 2 * flat.len()];
+        for (f, face) in self.mesh.faces.iter().enumerate() {
+            let (weight, rotation) = proxy(&self.jacobian(f, flat)).ok_or_else(singular)?;
+            let goal = weight * rotation;
+            for r in 0..2 {
+                for c in 0..2 {
+                    let row: [(usize, f64); 6] = std::array::from_fn(|n| {
+                        let (k, d) = (n / 2, n % 2);
+                        (2 * face[k] as usize + d, weight[(r, d)] * self.gradients[f][k][c])
+                    });
+                    matrix.add_square(&row, self.rest[f].area);
+                    row.iter().for_each(|(i, coefficient)| rhs[*i][0] += self.rest[f].area * coefficient * goal[(r, c)]);
+                }
+            }
+        }
+        for (v, p) in flat.iter().enumerate() {
+            for d in 0..2 {
+                matrix.add(2 * v + d, 2 * v + d, PROXIMAL);
+                rhs[2 * v + d][0] += PROXIMAL * p[d];
+            }
+        }
+        matrix.factor().and_then(|factor| factor.solve(&mut rhs)).map_err(|_| singular())?;
+        Ok((0..flat.len()).map(|v| Vec2::new(rhs[2 * v][0], rhs[2 * v + 1][0])).collect())
+    }
+
+    /// The smallest positive step along `direction` at which a face loses its area.
+    fn first_flip(&self, flat: &[Vec2], direction: &[Vec2]) -> f64 {
+        let of = |face: &[u32; 3]| {
+            let [p, q, r] = face.map(|v| flat[v as usize]);
+            let [dp, dq, dr] = face.map(|v| direction[v as usize]);
+            let (e, f, de, df) = (q - p, r - p, dq - dp, dr - dp);
+            smallest_positive_root(de.perp(&df), de.perp(&f) + e.perp(&df), e.perp(&f))
+        };
+        self.mesh.faces.iter().map(of).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// W and R of the proxy at J = U diag(σ) Vᵀ: W = U diag(√((σ − σ⁻³)/(σ − 1))) Uᵀ, R = U Vᵀ.
+fn proxy(j: &Matrix2<f64>) -> Option<(Matrix2<f64>, Matrix2<f64>)> {
+    let svd = j.svd(true, true);
+    let (u, vt) = (svd.u?, svd.v_t?);
+    let weight = svd.singular_values.map(|s| {
+        let s = s.max(1e-8);
+        if (s - 1.0).abs() < 1e-6 { 2.0 } else { ((s - s.powi(-3)) / (s - 1.0)).sqrt() }
+    });
+    Some((u * Matrix2::from_diagonal(&weight) * u.transpose(), u * vt))
+}
+
+/// The smallest positive root of a t² + b t + c, infinite if there is none.
+fn smallest_positive_root(a: f64, b: f64, c: f64) -> f64 {
+    let discriminant = b * b - 4.0 * a * c;
+    if discriminant < 0.0 {
+        return f64::INFINITY;
+    }
+    // The stable pair of roots: no cancellation between b and the square root.
+    let q = -0.5 * (b + discriminant.sqrt().copysign(b));
+    let positive = |t: f64| if t > 0.0 { t } else { f64::INFINITY };
+    positive(q / a).min(positive(c / q))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn roots_are_found_without_cancellation() {
+        assert!((smallest_positive_root(1.0, -3.0, 2.0) - 1.0).abs() < 1e-12);
+        assert!((smallest_positive_root(0.0, -2.0, 1.0) - 0.5).abs() < 1e-12);
+        assert_eq!(smallest_positive_root(1.0, 3.0, 2.0), f64::INFINITY);
+    }
+
+    #[test]
+    fn a_squashed_square_is_relaxed_to_its_rest_shape() {
+        let positions = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+        let mesh = TriMesh {
+            positions: positions.iter().map(|p| crate::mesh::Vec3::new(p.0, p.1, 0.0)).collect(),
+            faces: vec![[0, 1, 2], [0, 2, 3]],
+        };
+        let start: Vec<Vec2> = positions.iter().map(|p| Vec2::new(3.0 * p.0, 0.2 * p.1 + 0.5 * p.0)).collect();
+        let (flat, _) = minimise(&mesh, &RestTriangle::of(&mesh), &start).unwrap();
+        for (a, b) in [(0, 1), (1, 2), (2, 3), (3, 0)] {
+            assert!(((flat[a] - flat[b]).norm() - 1.0).abs() < 0.01);
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! The unit square of uv laid over a chart: its tightest enclosing square, any rotation.
+
+use crate::mesh::Vec2;
+
+/// A square in the plane of a chart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// The corner at uv (0, 0).
+    pub origin: Vec2,
+    /// Unit vector along u; v is this turned left by a quarter.
+    pub axis: Vec2,
+    /// Side length, the chart's units.
+    pub side: f64,
+}
+
+/// Directions tried for the square; a finer search moves the side by less than a tenth of a per cent.
+const DIRECTIONS: usize = 180;
+
+impl Frame {
+    /// The smallest square, over `DIRECTIONS` rotations of a quarter turn, that holds all points; centred on them.
+    pub fn tightest(points: &[Vec2]) -> Frame {
+        let candidates = (0..DIRECTIONS).map(|k| {
+            let angle = std::f64::consts::FRAC_PI_2 * k as f64 / DIRECTIONS as f64;
+            Self::along(Vec2::new(angle.cos(), angle.sin()), points)
+        });
+        candidates.min_by(|a, b| a.side.total_cmp(&b.side)).unwrap_or(Frame {
+            origin: Vec2::zeros(),
+            axis: Vec2::x(),
+            side: 1.0,
+        })
+    }
+
+    fn along(axis: Vec2, points: &[Vec2]) -> Frame {
+        let up = Vec2::new(-axis.y, axis.x);
+        let (mut low, mut high) = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
+        for p in points {
+            let q = Vec2::new(axis.dot(p), up.dot(p));
+            low = low.inf(&q);
+            high = high.sup(&q);
+        }
+        let extent = high - low;
+        let side = extent.max();
+        let corner = low - (Vec2::repeat(side) - extent) / 2.0;
+        Frame { origin: axis * corner.x + up * corner.y, axis, side }
+    }
+
+    /// Chart point to uv.
+    pub fn uv(&self, p: Vec2) -> Vec2 {
+        let d = p - self.origin;
+        Vec2::new(self.axis.dot(&d), self.axis.perp(&d)) / self.side
+    }
+
+    /// Uv to chart point.
+    pub fn point(&self, uv: Vec2) -> Vec2 {
+        let up = Vec2::new(-self.axis.y, self.axis.x);
+        self.origin + (self.axis * uv.x + up * uv.y) * self.side
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn all_points_lie_in_the_square_and_come_back(
+            points in prop::collection::vec((-5.0..5.0f64, -5.0..5.0f64), 3..40)
+        ) {
+            let points: Vec<Vec2> = points.into_iter().map(|(x, y)| Vec2::new(x, y)).collect();
+            let frame = Frame::tightest(&points);
+            for p in &points {
+                let uv = frame.uv(*p);
+                prop_assert!(uv.min() >= -1e-12 && uv.max() <= 1.0 + 1e-12);
+                prop_assert!((frame.point(uv) - p).norm() < 1e-11);
+            }
+        }
+    }
+
+    #[test]
+    fn a_turned_square_is_found() {
+        let turned: Vec<Vec2> = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)].map(Vec2::from_tuple).to_vec();
+        assert!((Frame::tightest(&turned).side - 2f64.sqrt()).abs() < 1e-9);
+    }
+
+    trait FromTuple {
+        fn from_tuple(p: (f64, f64)) -> Self;
+    }
+    impl FromTuple for Vec2 {
+        fn from_tuple(p: (f64, f64)) -> Self {
+            Vec2::new(p.0, p.1)
+        }
+    }
+}
