@@ -1,0 +1,183 @@
+//! The hole's polygon in the plane → triangles: an even triangular lattice inside, constrained Delaunay (spade) with the rim's edges.
+
+use rstar::RTree;
+use rstar::primitives::Line;
+use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation as _};
+
+use super::PatchError;
+use crate::mesh::Vec2;
+
+/// Lattice points nearer to the rim than this, in lattice spacings, are left out: they would make slivers.
+const CLEARANCE: f64 = 0.62;
+
+/// A triangulated polygon.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Triangulation {
+    /// The polygon's corners in their order, then the inner points.
+    pub points: Vec<Vec2>,
+    /// Counter-clockwise triangles; every polygon edge belongs to exactly one.
+    pub faces: Vec<[u32; 3]>,
+}
+
+/// Triangulates a simple counter-clockwise polygon with edges of about `spacing` inside, and at most about `most` inner points.
+///
+/// # Errors
+/// `RimCrosses` when the polygon crosses or touches itself.
+pub fn triangulate(polygon: &[Vec2], spacing: f64, most: usize) -> Result<Triangulation, PatchError> {
+    let area = signed_area(polygon);
+    if area.is_nan() || area <= 0.0 {
+        return Err(PatchError::RimCrosses);
+    }
+    // A triangular lattice of spacing h has one point per h²·√3/2.
+    let spacing = spacing.max((area / most.max(1) as f64 / 0.75f64.sqrt()).sqrt());
+    let mut points = polygon.to_vec();
+    points.extend(lattice(polygon, spacing));
+    let faces = constrained_delaunay(&points, polygon.len())?;
+    Ok(Triangulation { points, faces })
+}
+
+/// Signed area of a polygon (shoelace), positive when counter-clockwise.
+pub fn signed_area(polygon: &[Vec2]) -> f64 {
+    let next = polygon.iter().cycle().skip(1);
+    0.5 * polygon.iter().zip(next).map(|(a, b)| a.perp(b)).sum::<f64>()
+}
+
+/// Points of a triangular lattice inside the polygon, clear of its edges.
+fn lattice(polygon: &[Vec2], spacing: f64) -> Vec<Vec2> {
+    let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
+    let tree = RTree::bulk_load(edges.map(|(a, b)| Line::new([a.x, a.y], [b.x, b.y])).collect());
+    let low = polygon.iter().fold(polygon[0], |m, p| m.inf(p));
+    let high = polygon.iter().fold(polygon[0], |m, p| m.sup(p));
+    let rise = spacing * 0.75f64.sqrt();
+    let clear = (CLEARANCE * spacing).powi(2);
+    let mut points = Vec::new();
+    for row in 0..=((high.y - low.y) / rise) as usize {
+        let y = low.y + (row as f64 + 0.5) * rise;
+        let shift = if row % 2 == 0 { 0.25 } else { 0.75 };
+        for span in crossings(polygon, y).chunks_exact(2) {
+            let first = ((span[0] - low.x) / spacing - shift).ceil();
+            let last = ((span[1] - low.x) / spacing - shift).floor();
+            for column in first as i64..=last as i64 {
+                let p = Vec2::new(low.x + (column as f64 + shift) * spacing, y);
+                let free = tree.nearest_neighbor(&[p.x, p.y]).is_none_or(|line| {
+                    use rstar::PointDistance;
+                    line.distance_2(&[p.x, p.y]) > clear
+                });
+                if free {
+                    points.push(p);
+                }
+            }
+        }
+    }
+    points
+}
+
+/// Where a horizontal line enters and leaves the polygon, in order of x.
+fn crossings(polygon: &[Vec2], y: f64) -> Vec<f64> {
+    let mut xs: Vec<f64> = polygon
+        .iter()
+        .zip(polygon.iter().cycle().skip(1))
+        .filter(|(a, b)| (a.y <= y) != (b.y <= y))
+        .map(|(a, b)| a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x))
+        .collect();
+    xs.sort_by(f64::total_cmp);
+    xs
+}
+
+/// A point that remembers its index.
+#[derive(Clone, Copy)]
+struct Indexed {
+    at: Point2<f64>,
+    index: u32,
+}
+
+impl HasPosition for Indexed {
+    type Scalar = f64;
+    fn position(&self) -> Point2<f64> {
+        self.at
+    }
+}
+
+/// Delaunay triangles inside the polygon made of the first `rim` points.
+fn constrained_delaunay(points: &[Vec2], rim: usize) -> Result<Vec<[u32; 3]>, PatchError> {
+    let vertices = (0u32..).zip(points).map(|(index, p)| Indexed { at: Point2::new(p.x, p.y), index }).collect();
+    let edges = (0..rim).map(|k| [k, (k + 1) % rim]).collect();
+    let mut crossed = false;
+    let cdt = ConstrainedDelaunayTriangulation::<Indexed>::try_bulk_load_cdt(vertices, edges, |_| crossed = true)
+        .map_err(|_| PatchError::RimCrosses)?;
+    if crossed || cdt.num_vertices() != points.len() || cdt.num_constraints() != rim {
+        return Err(PatchError::RimCrosses);
+    }
+
+    // Flood from the inner side of the rim's edges; constraints stop it.
+    let mut inside = vec![false; cdt.num_all_faces()];
+    let mut open: Vec<_> = cdt
+        .directed_edges()
+        .filter(|e| {
+            let (from, to) = (e.from().data().index as usize, e.to().data().index as usize);
+            e.is_constraint_edge() && to == (from + 1) % rim
+        })
+        .filter_map(|e| e.face().as_inner())
+        .collect();
+    let mut faces = Vec::new();
+    while let Some(face) = open.pop() {
+        if std::mem::replace(&mut inside[face.fix().index()], true) {
+            continue;
+        }
+        faces.push(face.vertices().map(|v| v.data().index));
+        let across = face.adjacent_edges().into_iter().filter(|e| !e.is_constraint_edge());
+        open.extend(across.filter_map(|e| e.rev().face().as_inner()));
+    }
+    // Triangle count of a polygon with inner points (Euler): anything else leaked or lost a piece.
+    if faces.len() + 2 != rim + 2 * (points.len() - rim) {
+        return Err(PatchError::RimCrosses);
+    }
+    // Start every triangle at its lowest corner and sort: the order then depends on the points alone.
+    for face in &mut faces {
+        let lowest = (0..3).min_by_key(|k| face[*k]).unwrap_or(0);
+        face.rotate_left(lowest);
+    }
+    faces.sort_unstable();
+    Ok(faces)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn star(radii: &[f64]) -> Vec<Vec2> {
+        let turn = std::f64::consts::TAU / radii.len() as f64;
+        radii.iter().enumerate().map(|(k, r)| Vec2::new((turn * k as f64).cos(), (turn * k as f64).sin()) * *r).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn triangles_tile_any_star(radii in prop::collection::vec(0.5..2.0f64, 5..60), spacing in 0.05..0.6f64) {
+            let polygon = star(&radii);
+            let tiled = triangulate(&polygon, spacing, 5_000).unwrap();
+            let mut sum = 0.0;
+            for face in &tiled.faces {
+                let corners = face.map(|v| tiled.points[v as usize]);
+                let area = signed_area(&corners);
+                prop_assert!(area > 0.0);
+                sum += area;
+            }
+            prop_assert!((sum - signed_area(&polygon)).abs() < 1e-9);
+            prop_assert_eq!(&tiled.points[..polygon.len()], &polygon[..]);
+        }
+    }
+
+    #[test]
+    fn a_figure_of_eight_is_refused() {
+        let eight = [(0.0, 0.0), (1.0, 1.0), (2.0, 0.0), (2.0, 1.5), (1.0, 0.5), (0.0, 1.5)];
+        let eight: Vec<Vec2> = eight.iter().map(|p| Vec2::new(p.0, p.1)).collect();
+        assert!(matches!(triangulate(&eight, 0.1, 1000), Err(PatchError::RimCrosses)));
+    }
+
+    #[test]
+    fn the_number_of_points_is_bounded() {
+        let tiled = triangulate(&star(&[1.0; 30]), 1e-6, 500).unwrap();
+        assert!(tiled.points.len() < 600);
+    }
+}
