@@ -1,0 +1,258 @@
+//! The accessor reader: component types × normalized × stride × sparse, every count checked against the bytes before memory is asked for.
+
+use gltf::json::accessor::{BYTE, FLOAT, SHORT, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT};
+use gltf::json::accessor::{ComponentType, Type};
+
+use super::ScanError;
+use super::buffers::{Document, View};
+use super::json::Place;
+
+/// An accessor whose extent is known to lie inside its buffers.
+pub(super) struct Accessor<'d> {
+    pub pointer: String,
+    pub component: ComponentType,
+    pub kind: Type,
+    pub count: usize,
+    normalized: bool,
+    base: Option<Elements<'d>>,
+    sparse: Option<Sparse<'d>>,
+}
+
+/// Elements of one size at one distance.
+struct Elements<'d> {
+    bytes: &'d [u8],
+    stride: usize,
+    size: usize,
+}
+
+struct Sparse<'d> {
+    indices: Elements<'d>,
+    component: ComponentType,
+    values: Elements<'d>,
+    pointer: String,
+}
+
+impl<'d> Accessor<'d> {
+    /// Opens the accessor at `place`. No element is decoded and nothing of its size allocated.
+    pub fn open<'a>(document: &'d Document<'a>, place: &Place<'a>) -> Result<Self, ScanError> {
+        let component = component(&place.need("componentType")?)?;
+        let kind = kind(&place.need("type")?)?;
+        let count_place = place.need("count")?;
+        let count = count_place.integer()?;
+        let size = component.size() * kind.multiplicity();
+        // Without a view it is zeros, which a sparse part may replace.
+        let base = match place.get("bufferView")? {
+            Some(view) => Some(elements(document.view(&view)?, place, count, size)?),
+            None => None,
+        };
+        let sparse = match place.get("sparse")? {
+            Some(sparse) => Some(open_sparse(document, &sparse, count, size)?),
+            None => None,
+        };
+        let normalized = place.flag("normalized")?;
+        let pointer = place.pointer.clone();
+        Ok(Self {
+            pointer,
+            component,
+            kind,
+            count,
+            normalized,
+            base,
+            sparse,
+        })
+    }
+
+    /// All elements as floats, `[count, N]`: normalized integers become [0, 1] or [−1, 1], others keep their value, and f32 its bits.
+    ///
+    /// Components the accessor lacks take `fill`'s value; those beyond `N` are dropped. The caller has bounded `count`.
+    pub fn floats<const N: usize>(&self, fill: [f32; N]) -> Result<Vec<[f32; N]>, ScanError> {
+        let step = self.component.size();
+        let components = self.kind.multiplicity().min(N);
+        let read = |bytes: &[u8]| {
+            let mut out = fill;
+            for (slot, bytes) in out
+                .iter_mut()
+                .zip(bytes.chunks_exact(step).take(components))
+            {
+                *slot = float(bytes, self.component, self.normalized);
+            }
+            out
+        };
+        let mut zero = fill;
+        zero.iter_mut()
+            .take(components)
+            .for_each(|slot| *slot = 0.0);
+        self.collect(zero, read)
+    }
+
+    /// All elements as unsigned integers; the caller has made sure that the type is SCALAR of an unsigned component.
+    pub fn integers(&self) -> Result<Vec<u32>, ScanError> {
+        self.collect(0, |bytes| unsigned(bytes, self.component))
+    }
+
+    fn collect<T: Copy>(&self, zero: T, read: impl Fn(&[u8]) -> T) -> Result<Vec<T>, ScanError> {
+        let mut out = match &self.base {
+            Some(base) => base.iter().take(self.count).map(&read).collect(),
+            None => vec![zero; self.count],
+        };
+        if let Some(sparse) = &self.sparse {
+            for (k, (index, value)) in sparse.indices.iter().zip(sparse.values.iter()).enumerate() {
+                let index = unsigned(index, sparse.component);
+                let slot = out
+                    .get_mut(index as usize)
+                    .ok_or_else(|| ScanError::Invalid {
+                        pointer: sparse.pointer.clone(),
+                        detail: format!(
+                            "element {k} is index {index}, but the accessor has {} elements",
+                            self.count
+                        ),
+                    })?;
+                *slot = read(value);
+            }
+        }
+        Ok(out)
+    }
+}
+
+impl<'d> Elements<'d> {
+    /// The elements in order; the extent was checked when they were opened.
+    fn iter(&self) -> impl Iterator<Item = &'d [u8]> {
+        let size = self.size;
+        self.bytes
+            .chunks(self.stride)
+            .filter_map(move |chunk| chunk.get(..size))
+    }
+}
+
+/// `count` elements of `size` bytes in `view`, from the `byteOffset` of `place`.
+fn elements<'d>(
+    view: View<'d>,
+    place: &Place<'_>,
+    count: usize,
+    size: usize,
+) -> Result<Elements<'d>, ScanError> {
+    let offset = place.integer_or("byteOffset", 0)?;
+    let stride = view.stride.unwrap_or(size);
+    if stride < size {
+        let detail = format!(
+            "is {stride}, less than the {size} bytes of an element of {}",
+            place.pointer
+        );
+        return Err(ScanError::Invalid {
+            pointer: format!("{}/byteStride", view.pointer),
+            detail,
+        });
+    }
+    let extent = match count {
+        0 => Some(0),
+        n => stride
+            .checked_mul(n - 1)
+            .and_then(|bytes| bytes.checked_add(size)),
+    };
+    extent
+        .and_then(|extent| offset.checked_add(extent))
+        .and_then(|end| view.bytes.get(offset..end))
+        .map(|bytes| Elements { bytes, stride, size })
+        .ok_or_else(|| {
+            place.invalid(format!(
+                "{count} elements of {size} bytes, {stride} apart, from byteOffset {offset} go past the {} bytes of {}",
+                view.bytes.len(),
+                view.pointer
+            ))
+        })
+}
+
+fn open_sparse<'d, 'a>(
+    document: &'d Document<'a>,
+    place: &Place<'a>,
+    elements_there: usize,
+    size: usize,
+) -> Result<Sparse<'d>, ScanError> {
+    let count = place.need("count")?;
+    let n = count.integer()?;
+    if n > elements_there {
+        return Err(count.invalid(format!(
+            "is {n}, more than the {elements_there} elements of the accessor"
+        )));
+    }
+    let indices_place = place.need("indices")?;
+    let component = component(&indices_place.need("componentType")?)?;
+    if !is_unsigned(component) {
+        return Err(indices_place.invalid("sparse indices must be unsigned integers"));
+    }
+    let values_place = place.need("values")?;
+    let indices = document.view(&indices_place.need("bufferView")?)?;
+    let values = document.view(&values_place.need("bufferView")?)?;
+    Ok(Sparse {
+        indices: elements(indices, &indices_place, n, component.size())?,
+        component,
+        values: elements(values, &values_place, n, size)?,
+        pointer: indices_place.pointer,
+    })
+}
+
+/// Whether indices may be stored like this.
+pub(super) fn is_unsigned(component: ComponentType) -> bool {
+    matches!(
+        component,
+        ComponentType::U8 | ComponentType::U16 | ComponentType::U32
+    )
+}
+
+fn component(place: &Place<'_>) -> Result<ComponentType, ScanError> {
+    match u32::try_from(place.integer()?).unwrap_or(0) {
+        BYTE => Ok(ComponentType::I8),
+        UNSIGNED_BYTE => Ok(ComponentType::U8),
+        SHORT => Ok(ComponentType::I16),
+        UNSIGNED_SHORT => Ok(ComponentType::U16),
+        UNSIGNED_INT => Ok(ComponentType::U32),
+        FLOAT => Ok(ComponentType::F32),
+        _ => Err(place.invalid("is no component type of glTF")),
+    }
+}
+
+fn kind(place: &Place<'_>) -> Result<Type, ScanError> {
+    match place.text()? {
+        "SCALAR" => Ok(Type::Scalar),
+        "VEC2" => Ok(Type::Vec2),
+        "VEC3" => Ok(Type::Vec3),
+        "VEC4" => Ok(Type::Vec4),
+        _ => Err(place.invalid("must be SCALAR, VEC2, VEC3 or VEC4 here")),
+    }
+}
+
+fn unsigned(bytes: &[u8], component: ComponentType) -> u32 {
+    match (component, bytes) {
+        (ComponentType::U8, &[a, ..]) => a.into(),
+        (ComponentType::U16, &[a, b, ..]) => u16::from_le_bytes([a, b]).into(),
+        (ComponentType::U32, &[a, b, c, d, ..]) => u32::from_le_bytes([a, b, c, d]),
+        // Callers ask for unsigned components only.
+        _ => 0,
+    }
+}
+
+fn float(bytes: &[u8], component: ComponentType, normalized: bool) -> f32 {
+    let (value, full) = match (component, bytes) {
+        (ComponentType::F32, &[a, b, c, d]) => return f32::from_le_bytes([a, b, c, d]),
+        (ComponentType::I8, &[a]) => (f64::from(a as i8), f64::from(i8::MAX)),
+        (ComponentType::I16, &[a, b]) => {
+            (f64::from(i16::from_le_bytes([a, b])), f64::from(i16::MAX))
+        }
+        (ComponentType::U8, &[a]) => (f64::from(a), f64::from(u8::MAX)),
+        (ComponentType::U16, &[a, b]) => {
+            (f64::from(u16::from_le_bytes([a, b])), f64::from(u16::MAX))
+        }
+        (ComponentType::U32, &[a, b, c, d]) => (
+            f64::from(u32::from_le_bytes([a, b, c, d])),
+            f64::from(u32::MAX),
+        ),
+        // `bytes` is always one component long.
+        _ => (0.0, 1.0),
+    };
+    // The most negative integer stands one step below −1 and is clamped (glTF 2.0, 3.6.2.2).
+    if normalized {
+        (value / full).max(-1.0) as f32
+    } else {
+        value as f32
+    }
+}

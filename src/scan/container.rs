@@ -1,0 +1,199 @@
+//! The outer shell of a scan: GLB chunks, or a bare JSON document.
+
+use std::ops::Range;
+
+use super::ScanError;
+
+/// How the scan is packed; told by its first bytes, not by a name or media type.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Container {
+    /// Binary glTF: magic `glTF`, a JSON chunk, mostly a BIN chunk.
+    Glb,
+    /// A JSON document with its buffers as data URIs.
+    Gltf,
+}
+
+impl Container {
+    /// The media type of this packing.
+    pub fn media_type(self) -> &'static str {
+        match self {
+            Self::Glb => "model/gltf-binary",
+            Self::Gltf => "model/gltf+json",
+        }
+    }
+}
+
+/// Where the parts of a scan lie in its bytes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Layout {
+    pub container: Container,
+    pub json: Range<usize>,
+    /// The payload of the BIN chunk, padding included.
+    pub bin: Option<Range<usize>>,
+    /// Chunks after JSON and BIN, headers included.
+    pub rest: Range<usize>,
+}
+
+const MAGIC: &[u8] = b"glTF";
+const JSON_CHUNK: u32 = 0x4E4F_534A;
+const BIN_CHUNK: u32 = 0x004E_4942;
+const HEADER: usize = 12;
+const CHUNK_HEADER: usize = 8;
+
+/// Finds the parts of a scan; allocates nothing.
+pub(super) fn layout(bytes: &[u8]) -> Result<Layout, ScanError> {
+    let fail = |offset: usize, detail: &str| ScanError::Container {
+        offset,
+        detail: detail.into(),
+    };
+    if bytes.is_empty() {
+        return Err(fail(0, "the scan is empty"));
+    }
+    if bytes.starts_with(MAGIC) {
+        return glb_layout(bytes);
+    }
+    let start = if bytes.starts_with(b"\xEF\xBB\xBF") {
+        3
+    } else {
+        0
+    };
+    match bytes.iter().skip(start).find(|b| !b.is_ascii_whitespace()) {
+        Some(b'{') => Ok(Layout {
+            container: Container::Gltf,
+            json: start..bytes.len(),
+            bin: None,
+            rest: bytes.len()..bytes.len(),
+        }),
+        _ => Err(fail(
+            0,
+            "neither the magic glTF of a GLB nor the { of a JSON document",
+        )),
+    }
+}
+
+fn glb_layout(bytes: &[u8]) -> Result<Layout, ScanError> {
+    let fail = |offset: usize, detail: String| ScanError::Container { offset, detail };
+    let (Some(version), Some(length)) = (word(bytes, 4), word(bytes, 8)) else {
+        return Err(fail(bytes.len(), "the GLB header is cut off".into()));
+    };
+    if version != 2 {
+        return Err(fail(4, format!("GLB version {version}; only 2 is known")));
+    }
+    if length as usize != bytes.len() {
+        return Err(fail(
+            8,
+            format!("the header says {length} bytes, there are {}", bytes.len()),
+        ));
+    }
+    let (kind, json) = chunk(bytes, HEADER)?;
+    if kind != JSON_CHUNK {
+        return Err(fail(HEADER + 4, "the first chunk is not JSON".into()));
+    }
+    let (mut bin, mut at, mut first) = (None, json.end, true);
+    let mut rest = at;
+    while at < bytes.len() {
+        let (kind, body) = chunk(bytes, at)?;
+        at = body.end;
+        if first && kind == BIN_CHUNK {
+            rest = at;
+            bin = Some(body);
+        }
+        first = false;
+    }
+    // Some exporters pad JSON with zeros instead of spaces.
+    let padding = bytes
+        .get(json.clone())
+        .unwrap_or_default()
+        .iter()
+        .rev()
+        .take_while(|byte| **byte == 0)
+        .count();
+    let json = json.start..json.end - padding;
+    Ok(Layout {
+        container: Container::Glb,
+        json,
+        bin,
+        rest: rest..bytes.len(),
+    })
+}
+
+/// Kind and payload of the chunk whose header stands at `at`.
+fn chunk(bytes: &[u8], at: usize) -> Result<(u32, Range<usize>), ScanError> {
+    let (Some(length), Some(kind)) = (word(bytes, at), word(bytes, at + 4)) else {
+        return Err(ScanError::Container {
+            offset: at,
+            detail: "a chunk header is cut off".into(),
+        });
+    };
+    let start = at + CHUNK_HEADER;
+    let left = bytes.len() - start;
+    if length as usize > left {
+        let detail = format!("the chunk says {length} bytes, {left} are left");
+        return Err(ScanError::Container { offset: at, detail });
+    }
+    Ok((kind, start..start + length as usize))
+}
+
+fn word(bytes: &[u8], at: usize) -> Option<u32> {
+    bytes
+        .get(at..)?
+        .first_chunk()
+        .map(|word| u32::from_le_bytes(*word))
+}
+
+/// Packs a GLB: JSON padded with spaces, BIN with zeros, the other chunks as they were.
+///
+/// Returns `None` if the whole would not fit the format's 32-bit lengths.
+pub(super) fn pack_glb(json: &[u8], bin: Option<&[u8]>, rest: &[u8]) -> Option<Vec<u8>> {
+    let padded = |n: usize| n.next_multiple_of(4);
+    let total = HEADER
+        + CHUNK_HEADER
+        + padded(json.len())
+        + bin.map_or(0, |bin| CHUNK_HEADER + padded(bin.len()))
+        + rest.len();
+    let total = u32::try_from(total).ok()?;
+    let mut out = Vec::with_capacity(total as usize);
+    out.extend_from_slice(MAGIC);
+    out.extend_from_slice(&2u32.to_le_bytes());
+    out.extend_from_slice(&total.to_le_bytes());
+    let mut push = |kind: u32, body: &[u8], fill: u8| {
+        let length = padded(body.len());
+        // Fits: it is part of `total`.
+        out.extend_from_slice(&(length as u32).to_le_bytes());
+        out.extend_from_slice(&kind.to_le_bytes());
+        out.extend_from_slice(body);
+        out.resize(out.len() + length - body.len(), fill);
+    };
+    push(JSON_CHUNK, json, b' ');
+    if let Some(bin) = bin {
+        push(BIN_CHUNK, bin, 0);
+    }
+    out.extend_from_slice(rest);
+    Some(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn packing_and_finding_agree() {
+        let rest = [4, 0, 0, 0, b'X', b'Y', b'Z', 0, 9, 9, 9, 9];
+        let bytes = pack_glb(b"{}", Some(&[1, 2, 3, 4, 5]), &rest).unwrap();
+        let found = layout(&bytes).unwrap();
+        assert_eq!(&bytes[found.json], b"{}  ");
+        assert_eq!(&bytes[found.bin.unwrap()], &[1, 2, 3, 4, 5, 0, 0, 0]);
+        assert_eq!(&bytes[found.rest], &rest);
+    }
+
+    #[test]
+    fn every_truncation_is_an_error() {
+        let bytes = pack_glb(b"{}", Some(&[1, 2, 3, 4]), &[]).unwrap();
+        for n in 0..bytes.len() {
+            assert!(
+                matches!(layout(&bytes[..n]), Err(ScanError::Container { .. })),
+                "{n}"
+            );
+        }
+    }
+}

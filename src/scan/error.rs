@@ -1,0 +1,115 @@
+//! Why a scan could not be read or a patch not be written.
+//!
+//! Every variant about the file carries an RFC 6901 pointer into its JSON, so that a person can go and look.
+
+/// Why a scan could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum ScanError {
+    /// The bytes are neither a GLB nor a JSON document, or are cut off.
+    #[error("not a readable glTF at byte {offset}: {detail}")]
+    Container {
+        /// Where in the file, in bytes.
+        offset: usize,
+        /// What is wrong there.
+        detail: String,
+    },
+    /// The JSON breaks a rule of glTF that matters here.
+    #[error("{pointer}: {detail}")]
+    Invalid {
+        /// JSON pointer to the place.
+        pointer: String,
+        /// What is wrong there.
+        detail: String,
+    },
+    /// A vertex index points past the end of its primitive's vertices.
+    #[error(
+        "{pointer}: element {element} is index {index}, but the primitive has {vertices} vertices"
+    )]
+    IndexOutOfRange {
+        /// JSON pointer to the index accessor.
+        pointer: String,
+        /// Which element of the accessor.
+        element: usize,
+        /// The index found.
+        index: u32,
+        /// How many vertices there are.
+        vertices: usize,
+    },
+    /// A position is NaN or infinite, as stored or once its node's transform is applied.
+    #[error("{pointer}: position {element} is not finite")]
+    NotFinite {
+        /// JSON pointer to the POSITION accessor, or to the node whose transform overflows.
+        pointer: String,
+        /// Which element of the accessor.
+        element: usize,
+    },
+    /// The geometry is stored by an extension that this version does not decode.
+    #[error(
+        "{pointer}: the geometry is stored with {extension}, which is not supported; export the scan without it"
+    )]
+    Unsupported {
+        /// JSON pointer to the use of the extension.
+        pointer: String,
+        /// The extension's name.
+        extension: &'static str,
+    },
+    /// Needed data lies outside the file. It is never opened.
+    #[error(
+        "{pointer}: the data is in another file ({uri:?}); send a GLB or embed it as a data URI"
+    )]
+    External {
+        /// JSON pointer to the URI.
+        pointer: String,
+        /// The URI's first characters.
+        uri: String,
+    },
+    /// The scan is larger than a limit allows.
+    #[error("{pointer}: {found} exceeds the limit {limit} = {allowed}")]
+    Limit {
+        /// JSON pointer to the place that goes over.
+        pointer: String,
+        /// The limit's name, a field of [`super::Limits`].
+        limit: &'static str,
+        /// The limit's value.
+        allowed: usize,
+        /// What was found (the count up to and with this place).
+        found: usize,
+    },
+    /// The default scene draws no triangle.
+    #[error("the default scene draws no triangles; there is nothing to mend")]
+    NoTriangles,
+    /// A patch cannot be brought into the space of a node whose transform flattens everything.
+    #[error(
+        "/nodes/{node}: the node's transform is singular; a patch cannot be written into its space"
+    )]
+    Singular {
+        /// The node.
+        node: usize,
+    },
+    /// A patch that was to be appended contradicts itself or the scan.
+    #[error("addition {addition}: {detail}")]
+    Addition {
+        /// Which of the additions.
+        addition: usize,
+        /// What is wrong with it.
+        detail: String,
+    },
+}
+
+impl ScanError {
+    /// The JSON pointer of the place in the scan, where there is one.
+    pub fn pointer(&self) -> Option<&str> {
+        match self {
+            Self::Invalid { pointer, .. }
+            | Self::IndexOutOfRange { pointer, .. }
+            | Self::NotFinite { pointer, .. }
+            | Self::Unsupported { pointer, .. }
+            | Self::External { pointer, .. }
+            | Self::Limit { pointer, .. } => Some(pointer),
+            Self::Container { .. }
+            | Self::NoTriangles
+            | Self::Singular { .. }
+            | Self::Addition { .. } => None,
+        }
+    }
+}

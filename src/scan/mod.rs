@@ -1,0 +1,187 @@
+//! glTF in, glTF out: GLB and glTF with data URIs read into one triangle soup, patches appended, nothing else changed.
+//! The only room that knows glTF. It opens no path and no URL, and trusts no count before it has seen the bytes behind it.
+//! No welding, no holes, no opinion about cloth: those are `mesh` and the rooms after it.
+//!
+//! Skins and morph targets are read in their bind pose as stored; a patch on a mesh with morph targets gets as many targets
+//! without displacement, and a patch on a skinned mesh carries no joints (it stands still when the skin moves).
+
+mod accessor;
+mod append;
+mod buffers;
+mod container;
+mod error;
+pub mod export;
+mod json;
+mod read;
+#[cfg(test)]
+mod read_tests;
+mod scene;
+mod splice;
+#[cfg(test)]
+pub(crate) mod testing;
+mod triangles;
+mod write;
+#[cfg(test)]
+mod write_tests;
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use gltf::json::accessor::Type;
+use serde_json::Value;
+
+pub use container::Container;
+pub use error::ScanError;
+pub use write::{Addition, PatchPoint};
+
+use crate::mesh::TriMesh;
+use container::Layout;
+use scene::Placement;
+
+/// What a scan may cost. Every refusal names the field and its value.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Limits {
+    /// Vertices of all drawn primitives together, instances counted.
+    pub max_vertices: usize,
+    /// Triangles of all drawn primitives together, instances counted, degenerate ones too.
+    pub max_faces: usize,
+    /// Nodes of the default scene.
+    pub max_nodes: usize,
+    /// Primitives of all drawn meshes together, instances counted, points and lines too.
+    pub max_primitives: usize,
+    /// Numbers in all texture coordinate and colour sets together.
+    pub max_attribute_values: usize,
+    /// Texture coordinate sets, and colour sets, of one primitive.
+    pub max_attribute_sets: usize,
+    /// Values in the JSON, keys counted (an upper estimate, made before they are built).
+    pub max_json_values: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            max_vertices: 2_000_000,
+            max_faces: 4_000_000,
+            max_nodes: 100_000,
+            max_primitives: 10_000,
+            max_attribute_values: 32_000_000,
+            max_attribute_sets: 16,
+            max_json_values: 1_000_000,
+        }
+    }
+}
+
+/// A scan: the original bytes and the geometry decoded from them.
+#[derive(Debug, Clone)]
+pub struct Scan {
+    /// All triangles that the default scene draws, in scene space, unwelded. Triangles that name a vertex twice are left out.
+    pub surface: TriMesh,
+    /// The drawn primitives in the order of their faces in `surface`.
+    pub parts: Vec<Part>,
+    /// Runs of vertices that one node's accessor gave, in order.
+    blocks: Vec<Block>,
+    bytes: Vec<u8>,
+    layout: Layout,
+    json: Value,
+}
+
+/// A triangle primitive as one node draws it.
+#[derive(Debug, Clone)]
+pub struct Part {
+    /// Index of the node.
+    pub node: usize,
+    /// Index of the mesh.
+    pub mesh: usize,
+    /// Index of the primitive in its mesh.
+    pub primitive: usize,
+    /// Index of the material, if it has one.
+    pub material: Option<usize>,
+    /// Its vertices in `Scan::surface`. Primitives of a node that share their POSITION accessor share this range.
+    pub vertices: Range<u32>,
+    /// Its faces in `Scan::surface`; the parts' ranges follow one another.
+    pub faces: Range<u32>,
+    /// TEXCOORD_0, TEXCOORD_1, …, each `[vertices.len()]`, indexed by vertex − `vertices.start`; NaN and infinities read as 0.
+    pub texcoords: Vec<Arc<[[f32; 2]]>>,
+    /// COLOR_0, COLOR_1, … in the same way, linear RGBA; a set without alpha has alpha 1.
+    pub colors: Vec<Arc<[[f32; 4]]>>,
+    /// Whether the primitive has normals; without, it is drawn flat.
+    pub has_normals: bool,
+    /// Whether darn made it: its `extras.darn.reconstructed` says so.
+    pub reconstructed: bool,
+    /// Whether several drawn nodes share this mesh: a patch written once then shows at each of them.
+    pub shared: bool,
+    /// Whether this is the first drawn node of its mesh, the one to patch.
+    pub first_instance: bool,
+    /// Number of morph targets.
+    targets: usize,
+    color_kinds: Vec<Type>,
+    placement: Placement,
+}
+
+/// A run of vertices and their stored positions.
+#[derive(Debug, Clone)]
+struct Block {
+    node: usize,
+    /// First vertex in `Scan::surface`.
+    start: u32,
+    /// As stored, in the node's space.
+    local: Vec<[f32; 3]>,
+}
+
+impl Scan {
+    /// Reads a scan. GLB or JSON is told by the first bytes; only data URIs and the BIN chunk are ever read.
+    ///
+    /// Memory: about 100 bytes a JSON value, 36 a vertex, 12 a face, 4 an attribute value, and one copy of `bytes`; all bounded
+    /// by `limits` before it is asked for.
+    ///
+    /// # Errors
+    /// See [`ScanError`]; a scan that draws no triangle is [`ScanError::NoTriangles`].
+    pub fn read(bytes: &[u8], limits: &Limits) -> Result<Self, ScanError> {
+        read::read(bytes, limits)
+    }
+
+    /// The scan with patches appended, in the container it came in. Without additions, the very bytes that were read.
+    ///
+    /// Everything that was there keeps its value, spelling and index; the BIN chunk keeps its bytes as a prefix.
+    ///
+    /// # Errors
+    /// [`ScanError::Addition`] for a patch that contradicts itself or the scan, [`ScanError::Singular`] for one on a node whose
+    /// transform flattens space.
+    pub fn write(&self, additions: &[Addition]) -> Result<Vec<u8>, ScanError> {
+        write::write(self, additions)
+    }
+
+    /// How the scan is packed, and how [`Scan::write`] packs it again.
+    pub fn container(&self) -> Container {
+        self.layout.container
+    }
+
+    /// The part that a face of `surface` belongs to.
+    pub fn part_of_face(&self, face: u32) -> Option<usize> {
+        let at = self.parts.partition_point(|part| part.faces.end <= face);
+        self.parts
+            .get(at)
+            .filter(|part| part.faces.contains(&face))
+            .map(|_| at)
+    }
+
+    /// The name of a part's mesh, or of its node where the mesh has none.
+    pub fn mesh_name(&self, part: usize) -> Option<&str> {
+        let part = self.parts.get(part)?;
+        let name = |list: &str, index: usize| self.json.get(list)?.get(index)?.get("name")?.as_str();
+        name("meshes", part.mesh).or_else(|| name("nodes", part.node))
+    }
+
+    /// The node that a vertex of `surface` belongs to and its position as stored there.
+    fn stored(&self, vertex: u32) -> Option<(usize, [f32; 3])> {
+        let at = self
+            .blocks
+            .partition_point(|block| block.start <= vertex)
+            .checked_sub(1)?;
+        let block = self.blocks.get(at)?;
+        Some((
+            block.node,
+            *block.local.get((vertex - block.start) as usize)?,
+        ))
+    }
+}

@@ -1,0 +1,126 @@
+//! Small scans built by hand, for tests.
+
+use serde_json::{Value, json};
+
+use super::container::pack_glb;
+
+/// A scan under construction: JSON that a test may edit freely, and the bytes of its first buffer.
+#[derive(Debug, Clone)]
+pub(crate) struct Builder {
+    pub json: Value,
+    pub bin: Vec<u8>,
+}
+
+impl Builder {
+    /// A scene of one node with one mesh without primitives.
+    pub fn new() -> Self {
+        let json = json!({
+            "asset": {"version": "2.0", "extras": {"accession": "TX.1923.14"}},
+            "scene": 0,
+            "scenes": [{"nodes": [0]}],
+            "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": []}],
+            "materials": [{"name": "cloth", "doubleSided": true, "extras": {"weave": "twill"}}],
+            "accessors": [],
+            "bufferViews": [],
+            "buffers": [{"byteLength": 0}],
+        });
+        Self {
+            json,
+            bin: Vec::new(),
+        }
+    }
+
+    /// The unit square of z = 0, seen from +z, as two triangles with u16 indices and `material` 0.
+    pub fn square() -> Self {
+        let mut out = Self::new();
+        let corners = [
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [1.0, 1.0, 0.0],
+            [0.0, 1.0, 0.0],
+        ];
+        let position = out.floats(&corners);
+        let indices = out.indices_u16(&[0, 1, 2, 0, 2, 3]);
+        out.primitive(
+            json!({"attributes": {"POSITION": position}, "indices": indices, "material": 0}),
+        );
+        out
+    }
+
+    /// Appends a buffer view; its index.
+    pub fn view(&mut self, bytes: &[u8]) -> usize {
+        self.bin.resize(self.bin.len().next_multiple_of(4), 0);
+        let view = json!({"buffer": 0, "byteOffset": self.bin.len(), "byteLength": bytes.len()});
+        self.bin.extend_from_slice(bytes);
+        self.push("bufferViews", view)
+    }
+
+    /// Appends an accessor over a view of its own; its index.
+    pub fn accessor(&mut self, bytes: &[u8], component: u32, kind: &str, count: usize) -> usize {
+        let view = self.view(bytes);
+        self.push(
+            "accessors",
+            json!({"bufferView": view, "componentType": component, "type": kind, "count": count}),
+        )
+    }
+
+    /// Appends an f32 accessor, VEC`N` with the bounds of its values; its index.
+    pub fn floats<const N: usize>(&mut self, values: &[[f32; N]]) -> usize {
+        let bytes: Vec<u8> = values
+            .iter()
+            .flatten()
+            .flat_map(|x| x.to_le_bytes())
+            .collect();
+        let at = self.accessor(&bytes, 5126, &format!("VEC{N}"), values.len());
+        let bound = |pick: fn(f32, f32) -> f32| -> Vec<f64> {
+            (0..N)
+                .map(|i| f64::from(values.iter().map(|v| v[i]).reduce(pick).unwrap_or(0.0)))
+                .collect()
+        };
+        self.json["accessors"][at]["min"] = json!(bound(f32::min));
+        self.json["accessors"][at]["max"] = json!(bound(f32::max));
+        at
+    }
+
+    pub fn indices_u16(&mut self, indices: &[u16]) -> usize {
+        let bytes: Vec<u8> = indices.iter().flat_map(|i| i.to_le_bytes()).collect();
+        self.accessor(&bytes, 5123, "SCALAR", indices.len())
+    }
+
+    /// Appends a primitive to the first mesh.
+    pub fn primitive(&mut self, primitive: Value) {
+        if let Some(list) = self.json["meshes"][0]["primitives"].as_array_mut() {
+            list.push(primitive);
+        }
+    }
+
+    /// Appends to a list at the top of the JSON; the new index.
+    pub fn push(&mut self, key: &str, value: Value) -> usize {
+        let list = self.json[key].as_array_mut().expect("a list");
+        list.push(value);
+        list.len() - 1
+    }
+
+    /// The scan as a GLB.
+    pub fn glb(mut self) -> Vec<u8> {
+        self.json["buffers"][0]["byteLength"] = json!(self.bin.len());
+        self.glb_as_is()
+    }
+
+    /// The scan as a GLB whose first buffer keeps the length that the test gave it.
+    pub fn glb_as_is(self) -> Vec<u8> {
+        pack_glb(self.json.to_string().as_bytes(), Some(&self.bin), &[]).expect("a small scan")
+    }
+
+    /// The scan as JSON with a data URI.
+    pub fn gltf(mut self) -> Vec<u8> {
+        use base64::Engine as _;
+        let data = base64::engine::general_purpose::STANDARD.encode(&self.bin);
+        self.json["buffers"][0] = json!({
+            "byteLength": self.bin.len(),
+            "uri": format!("data:application/octet-stream;base64,{data}"),
+        });
+        self.json.to_string().into_bytes()
+    }
+}
