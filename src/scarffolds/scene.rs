@@ -1,0 +1,359 @@
+//! Random scenes: what a sheet is made of, where it is carried, what it falls on; and one sheet's simulation from start to rest.
+//!
+//! Targets of pins are never further apart than the flat sheet allows; between the flat start and the targets, pins go along
+//! straight lines, along which distances are convex, so the cloth allows every moment of the way.
+
+use super::cloth::{Cloth, Fabric, Forces, GRAVITY, Pin, Point, SIDE, SPACING, VERTICES};
+use super::collide::Collider;
+use nalgebra::{Rotation3, Unit};
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+
+/// How the sheet is held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// All four corners carried to random targets: the paper's scene.
+    FourCorners,
+    /// Three corners carried, one free.
+    ThreeCorners,
+    /// Two corners carried, two free.
+    TwoCorners,
+    /// One edge held at several points drawn together: a curtain.
+    Curtain,
+    /// One to three vertices anywhere carried.
+    Points,
+    /// Fallen on a sphere, a bar, a block or the floor.
+    Draped,
+}
+
+/// Parameters of one sheet, as the manifest keeps them.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Scene {
+    /// How the sheet is held.
+    pub kind: Kind,
+    /// What it is made of.
+    pub fabric: Fabric,
+    /// Held vertices.
+    pub pins: Vec<usize>,
+    /// Where they end, metres; one for each pin.
+    pub targets: Vec<[f32; 3]>,
+    /// What it falls on.
+    pub obstacles: Vec<Collider>,
+    /// Seconds of the carrying.
+    pub carry: f32,
+    /// Velocity of the gusts while it is carried, m/s.
+    pub wind: [f32; 3],
+    /// Damping while it is carried, 1/s.
+    pub damping: f32,
+    /// Height of the unevenness it starts with, metres.
+    pub unevenness: f32,
+}
+
+/// Seconds of a step while the sheet moves.
+const STEP: f32 = 1.0e-3;
+/// Seconds after the carrying in which the sheet may come to rest.
+const SETTLE: f32 = 2.5;
+/// A sheet slower than this is at rest, m/s.
+const REST: f32 = 0.008;
+
+impl Scene {
+    /// Draws a scene.
+    pub fn draw(rng: &mut ChaCha8Rng) -> Self {
+        let kind = match rng.random_range(0..100) {
+            0..54 => Kind::FourCorners,
+            54..66 => Kind::ThreeCorners,
+            66..76 => Kind::TwoCorners,
+            76..83 => Kind::Curtain,
+            83..88 => Kind::Points,
+            _ => Kind::Draped,
+        };
+        let fold = log_uniform(rng, 0.0075, 0.036);
+        let fabric = Fabric {
+            bend: GRAVITY * fold * fold * fold,
+            shear: log_uniform(rng, 2.0e4, 3.0e5),
+            thickness: SPACING * rng.random_range(0.74..0.9),
+            friction: rng.random_range(0.05..0.5),
+            air: rng.random_range(0.3..2.0),
+        };
+        let pins = draw_pins(kind, rng);
+        let targets = match kind {
+            Kind::Curtain => gathered(&pins, rng),
+            _ => scattered(&pins, rng),
+        };
+        let gust = rng.random_range(0.0f32..1.0).powi(2) * 3.0;
+        Self {
+            kind,
+            fabric,
+            pins,
+            targets: targets.into_iter().map(Into::into).collect(),
+            obstacles: if kind == Kind::Draped {
+                draw_obstacles(rng)
+            } else {
+                Vec::new()
+            },
+            carry: rng.random_range(0.8..1.8),
+            wind: (direction(rng) * gust).into(),
+            damping: rng.random_range(0.3..2.0),
+            unevenness: log_uniform(rng, 3.0e-4, 6.0e-3),
+        }
+    }
+
+    /// Lets the sheet come to rest; `VERTICES` positions, metres. `rng` draws the unevenness of the start.
+    pub fn simulate(&self, rng: &mut ChaCha8Rng) -> Vec<Point> {
+        let start = uneven(self.unevenness, rng);
+        let pins: Vec<Pin> = self
+            .pins
+            .iter()
+            .map(|&vertex| Pin {
+                vertex,
+                at: start[vertex],
+            })
+            .collect();
+        let from: Vec<Point> = pins.iter().map(|pin| pin.at).collect();
+        let mut cloth = Cloth::new(&start, pins, self.fabric);
+        let carry_steps = (self.carry / STEP) as usize;
+        for step in 0..carry_steps {
+            let t = (step + 1) as f32 / carry_steps as f32;
+            for (k, (a, b)) in from.iter().zip(&self.targets).enumerate() {
+                cloth.carry(k, a + (Point::from(*b) - a) * t);
+            }
+            let gust = 4.0 * t * (1.0 - t) * (1.0 + (9.0 * t).sin());
+            let wind = Point::from(self.wind) * gust;
+            cloth.step(
+                &Forces {
+                    wind,
+                    damping: self.damping,
+                    step: STEP,
+                },
+                &self.obstacles,
+            );
+        }
+        let settle_steps = (SETTLE / STEP) as usize;
+        for step in 0..settle_steps {
+            let t = step as f32 / settle_steps as f32;
+            let damping = self.damping + 10.0 * t;
+            cloth.step(
+                &Forces {
+                    wind: Point::zeros(),
+                    damping,
+                    step: STEP,
+                },
+                &self.obstacles,
+            );
+            if step % 50 == 49 && cloth.speed() < REST {
+                break;
+            }
+        }
+        for _ in 0..250 {
+            cloth.step(
+                &Forces {
+                    wind: Point::zeros(),
+                    damping: 40.0,
+                    step: 0.5 * STEP,
+                },
+                &self.obstacles,
+            );
+        }
+        cloth.relax(24, &self.obstacles);
+        cloth.positions()
+    }
+}
+
+/// Where vertex `k` lies on the flat sheet, centred at the origin.
+fn flat(k: usize) -> Point {
+    Point::new(
+        (k % SIDE) as f32 * SPACING - 0.5,
+        (k / SIDE) as f32 * SPACING - 0.5,
+        0.0,
+    )
+}
+
+fn log_uniform(rng: &mut ChaCha8Rng, low: f32, high: f32) -> f32 {
+    (rng.random_range(low.ln()..high.ln())).exp()
+}
+
+fn direction(rng: &mut ChaCha8Rng) -> Point {
+    loop {
+        let p = Point::from_fn(|_, _| rng.random_range(-1.0..1.0));
+        let n = p.norm();
+        if n > 0.1 && n < 1.0 {
+            return p / n;
+        }
+    }
+}
+
+/// The flat sheet with a few smooth waves and a little noise of total height about `height`.
+fn uneven(height: f32, rng: &mut ChaCha8Rng) -> Vec<Point> {
+    let waves: Vec<[f32; 4]> = (0..4)
+        .map(|_| {
+            let turn = rng.random_range(0.0..std::f32::consts::TAU);
+            let pace = rng.random_range(4.0..30.0);
+            [
+                pace * turn.cos(),
+                pace * turn.sin(),
+                rng.random_range(0.0..std::f32::consts::TAU),
+                rng.random_range(0.2..0.6),
+            ]
+        })
+        .collect();
+    (0..VERTICES)
+        .map(|k| {
+            let mut p = flat(k);
+            let wave: f32 = waves
+                .iter()
+                .map(|w| w[3] * (w[0] * p.x + w[1] * p.y + w[2]).sin())
+                .sum();
+            p.z = height * (wave + rng.random_range(-0.2..0.2));
+            p
+        })
+        .collect()
+}
+
+fn draw_pins(kind: Kind, rng: &mut ChaCha8Rng) -> Vec<usize> {
+    let corners = [0, SIDE - 1, VERTICES - 1, VERTICES - SIDE];
+    let turn = rng.random_range(0..4);
+    let corner = |n: usize| corners[(n + turn) % 4];
+    match kind {
+        Kind::FourCorners => corners.to_vec(),
+        Kind::ThreeCorners => vec![corner(0), corner(1), corner(2)],
+        Kind::TwoCorners => vec![corner(0), corner(1 + usize::from(rng.random_bool(0.4)))],
+        Kind::Curtain => {
+            let hooks = rng.random_range(3..10);
+            (0..hooks)
+                .map(|n| (n * (SIDE - 1) + (hooks - 1) / 2) / (hooks - 1))
+                .collect()
+        }
+        Kind::Points => {
+            let mut pins: Vec<usize> = (0..rng.random_range(1..4))
+                .map(|_| rng.random_range(0..VERTICES))
+                .collect();
+            pins.sort_unstable();
+            pins.dedup();
+            pins
+        }
+        Kind::Draped if rng.random_bool(0.25) => vec![corner(0)],
+        Kind::Draped => Vec::new(),
+    }
+}
+
+/// Targets drawn around the shrunken, turned flat places of the pins, no two further apart than the cloth allows.
+fn scattered(pins: &[usize], rng: &mut ChaCha8Rng) -> Vec<Point> {
+    let shrink = rng.random_range(0.2..0.95);
+    let mut spread = rng.random_range(0.08..0.6);
+    let tilt = rng.random_range(0.0..std::f32::consts::FRAC_PI_2);
+    let turn = rng.random_range(0.0..std::f32::consts::TAU);
+    let axis = Unit::new_normalize(Point::new(turn.cos(), turn.sin(), 0.0));
+    let rotation = Rotation3::from_axis_angle(&axis, tilt);
+    loop {
+        let targets: Vec<Point> = pins
+            .iter()
+            .map(|&k| {
+                rotation * flat(k) * shrink
+                    + Point::from_fn(|_, _| rng.random_range(-spread..spread))
+            })
+            .collect();
+        let allowed = (0..pins.len()).all(|a| {
+            (0..a).all(|b| {
+                (targets[a] - targets[b]).norm() <= 0.97 * (flat(pins[a]) - flat(pins[b])).norm()
+            })
+        });
+        if allowed {
+            return targets;
+        }
+        spread *= 0.98;
+    }
+}
+
+/// Hooks of a curtain, drawn together and pulled out of line.
+fn gathered(pins: &[usize], rng: &mut ChaCha8Rng) -> Vec<Point> {
+    let width = rng.random_range(0.3..0.9);
+    let gap = 0.97 / (pins.len() - 1) as f32;
+    let depth = (gap * gap * (1.0 - width * width)).sqrt() * 0.5;
+    let slope = rng.random_range(-0.15..0.15);
+    pins.iter()
+        .map(|&k| {
+            let x = (k % SIDE) as f32 * SPACING - 0.5;
+            Point::new(
+                width * 0.97 * x,
+                rng.random_range(-depth..depth),
+                0.3 + slope * width * x,
+            )
+        })
+        .collect()
+}
+
+fn draw_obstacles(rng: &mut ChaCha8Rng) -> Vec<Collider> {
+    let mut spot = |top: f32| {
+        [
+            rng.random_range(-0.2..0.2),
+            rng.random_range(-0.2..0.2),
+            -0.03 - top,
+        ]
+    };
+    let places = [spot(0.0), spot(0.0)];
+    let floor = Collider::Floor {
+        z: rng.random_range(-0.8..-0.1),
+    };
+    let below = |p: [f32; 3], top: f32| [p[0], p[1], p[2] - top];
+    let sphere = |rng: &mut ChaCha8Rng, place: [f32; 3]| {
+        let radius = rng.random_range(0.08..0.4);
+        Collider::Sphere {
+            center: below(place, radius),
+            radius,
+        }
+    };
+    match rng.random_range(0..5) {
+        0 => vec![sphere(rng, places[0]), floor],
+        1 => vec![sphere(rng, places[0]), sphere(rng, places[1]), floor],
+        2 | 3 => {
+            let radius = rng.random_range(0.03..0.3);
+            let turn = rng.random_range(0.0..std::f32::consts::TAU);
+            vec![
+                Collider::Bar {
+                    center: below(places[0], radius),
+                    along: [turn.cos(), turn.sin()],
+                    radius,
+                },
+                floor,
+            ]
+        }
+        _ => {
+            let half = [
+                rng.random_range(0.08..0.35),
+                rng.random_range(0.08..0.35),
+                0.5,
+            ];
+            let radius = rng.random_range(0.01..0.08);
+            vec![
+                Collider::Block {
+                    center: below(places[0], 0.5 + radius),
+                    half,
+                    radius,
+                },
+                floor,
+            ]
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use rand::SeedableRng;
+
+    proptest! {
+        #[test]
+        fn targets_are_never_further_apart_than_the_cloth_allows(seed: u64) {
+            let scene = Scene::draw(&mut ChaCha8Rng::seed_from_u64(seed));
+            prop_assert_eq!(scene.pins.len(), scene.targets.len());
+            for (a, p) in scene.pins.iter().zip(&scene.targets) {
+                for (b, q) in scene.pins.iter().zip(&scene.targets) {
+                    let apart = (Point::from(*p) - Point::from(*q)).norm();
+                    prop_assert!(apart <= (flat(*a) - flat(*b)).norm() + 1e-5);
+                }
+            }
+        }
+    }
+}
