@@ -69,7 +69,9 @@ pub fn cell_at(uv: Vec2) -> usize {
 
 /// The index pairs of all 4-neighbours, right ones before upper ones.
 pub fn neighbour_pairs() -> impl Iterator<Item = (usize, usize)> {
-    let right = (0..CELLS).filter(|k| k % SIDE + 1 < SIDE).map(|k| (k, k + 1));
+    let right = (0..CELLS)
+        .filter(|k| k % SIDE + 1 < SIDE)
+        .map(|k| (k, k + 1));
     let upper = (0..CELLS - SIDE).map(|k| (k, k + SIDE));
     right.chain(upper)
 }
@@ -85,13 +87,20 @@ pub fn spacing(positions: &[Vec3], counted: impl Fn(usize, usize) -> bool) -> Sp
     }
     let n = pairs.max(1) as f64;
     let mean = sum / n;
-    Spacing { mean, variance: (squares / n - mean * mean).max(0.0), pairs }
+    Spacing {
+        mean,
+        variance: (squares / n - mean * mean).max(0.0),
+        pairs,
+    }
 }
 
 impl Grid {
     /// A grid that knows nothing.
     pub fn unknown() -> Self {
-        Grid { positions: vec![Vec3::zeros(); CELLS], known: vec![false; CELLS] }
+        Grid {
+            positions: vec![Vec3::zeros(); CELLS],
+            known: vec![false; CELLS],
+        }
     }
 
     /// Number of known cells.
@@ -108,7 +117,10 @@ impl Grid {
         }
         let known = self.positions.iter().zip(&self.known).filter(|(_, k)| **k);
         let centre = known.fold(Vec3::zeros(), |sum, (p, _)| sum + p) / self.known_count() as f64;
-        Some(Normalisation { centre, scale: spacing.mean * SIDE as f64 })
+        Some(Normalisation {
+            centre,
+            scale: spacing.mean * SIDE as f64,
+        })
     }
 
     /// This grid in the network's units.
@@ -119,7 +131,10 @@ impl Grid {
             .zip(&self.known)
             .map(|(p, known)| if *known { by.to_network(p) } else { [0.0; 3] })
             .collect();
-        NormalGrid { positions, known: self.known.iter().map(|k| f32::from(u8::from(*k))).collect() }
+        NormalGrid {
+            positions,
+            known: self.known.iter().map(|k| f32::from(u8::from(*k))).collect(),
+        }
     }
 
     /// Positions of all cells: the scan's where known, `predicted` (network's units) elsewhere.
@@ -184,7 +199,10 @@ mod tests {
     use proptest::prelude::*;
 
     fn plane(a: Vec3, b: Vec3, c: Vec3) -> Vec<Vec3> {
-        (0..CELLS).map(|k| cell_centre(k)).map(|uv| a + b * uv.x + c * uv.y).collect()
+        (0..CELLS)
+            .map(|k| cell_centre(k))
+            .map(|uv| a + b * uv.x + c * uv.y)
+            .collect()
     }
 
     proptest! {
@@ -223,7 +241,10 @@ mod tests {
     #[test]
     fn an_empty_or_collapsed_grid_has_no_normalisation() {
         assert_eq!(Grid::unknown().normalisation(), None);
-        let collapsed = Grid { positions: vec![Vec3::x(); CELLS], known: vec![true; CELLS] };
+        let collapsed = Grid {
+            positions: vec![Vec3::x(); CELLS],
+            known: vec![true; CELLS],
+        };
         assert_eq!(collapsed.normalisation(), None);
     }
 }

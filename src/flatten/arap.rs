@@ -12,12 +12,23 @@ const ROUNDS: usize = 150;
 const GAIN: f64 = 1e-5;
 
 /// Minimises ½ Σ_f Σ_{e∈f} cot θₑ ‖e_uv − R_f e‖² from a start without flips; may flip faces. Returns the rounds, too.
-pub fn minimise(mesh: &TriMesh, rest: &[RestTriangle], start: &[Vec2]) -> Result<(Vec<Vec2>, usize), FlattenError> {
-    let singular = |_| FlattenError::Singular { stage: "ARAP", vertices: mesh.positions.len() };
+pub fn minimise(
+    mesh: &TriMesh,
+    rest: &[RestTriangle],
+    start: &[Vec2],
+) -> Result<(Vec<Vec2>, usize), FlattenError> {
+    let singular = |_| FlattenError::Singular {
+        stage: "ARAP",
+        vertices: mesh.positions.len(),
+    };
     let mut matrix = Symmetric::zero(start.len());
     for (face, triangle) in mesh.faces.iter().zip(rest) {
         for k in 0..3 {
-            matrix.add_spring(face[k] as usize, face[(k + 1) % 3] as usize, triangle.cotangent[k]);
+            matrix.add_spring(
+                face[k] as usize,
+                face[(k + 1) % 3] as usize,
+                triangle.cotangent[k],
+            );
         }
     }
     // The energy does not see translations: hold the first vertex where it is.

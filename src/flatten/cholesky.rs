@@ -20,7 +20,10 @@ pub(crate) struct Symmetric {
 impl Symmetric {
     /// The zero matrix of a size.
     pub fn zero(size: usize) -> Self {
-        Symmetric { size, entries: Vec::new() }
+        Symmetric {
+            size,
+            entries: Vec::new(),
+        }
     }
 
     /// Adds to the entry (i, j) and, by symmetry, (j, i).
@@ -49,9 +52,13 @@ impl Symmetric {
     /// # Errors
     /// `NotPositive` when it is not positive definite.
     pub fn factor(&self) -> Result<Factor, NotPositive> {
-        let matrix = SparseColMat::try_new_from_triplets(self.size, self.size, &self.entries).map_err(|_| NotPositive)?;
+        let matrix = SparseColMat::try_new_from_triplets(self.size, self.size, &self.entries)
+            .map_err(|_| NotPositive)?;
         let llt = matrix.sp_cholesky(Side::Lower).map_err(|_| NotPositive)?;
-        Ok(Factor { llt, size: self.size })
+        Ok(Factor {
+            llt,
+            size: self.size,
+        })
     }
 }
 
@@ -72,7 +79,11 @@ impl Factor {
         for (i, row) in rhs.iter_mut().enumerate() {
             *row = std::array::from_fn(|k| x[(i, k)]);
         }
-        if rhs.iter().flatten().all(|x| x.is_finite()) { Ok(()) } else { Err(NotPositive) }
+        if rhs.iter().flatten().all(|x| x.is_finite()) {
+            Ok(())
+        } else {
+            Err(NotPositive)
+        }
     }
 }
 

@@ -16,9 +16,17 @@ const SAFE: f64 = 0.8;
 const PROXIMAL: f64 = 1e-6;
 
 /// Minimises Σ_f A_f (‖J‖² + ‖J⁻¹‖²) from a start without flips; never flips a face. Returns the steps, too.
-pub fn minimise(mesh: &TriMesh, rest: &[RestTriangle], start: &[Vec2]) -> Result<(Vec<Vec2>, usize), FlattenError> {
+pub fn minimise(
+    mesh: &TriMesh,
+    rest: &[RestTriangle],
+    start: &[Vec2],
+) -> Result<(Vec<Vec2>, usize), FlattenError> {
     let gradients: Vec<[Vec2; 3]> = rest.iter().map(RestTriangle::gradients).collect();
-    let cloth = Cloth { mesh, rest, gradients };
+    let cloth = Cloth {
+        mesh,
+        rest,
+        gradients,
+    };
     let mut flat = start.to_vec();
     let mut energy = cloth.energy(&flat);
     let mut steps = 0;
@@ -29,7 +37,11 @@ pub fn minimise(mesh: &TriMesh, rest: &[RestTriangle], start: &[Vec2]) -> Result
         let mut length = (SAFE * cloth.first_flip(&flat, &direction)).min(1.0);
         let before = energy;
         for _ in 0..20 {
-            let tried: Vec<Vec2> = flat.iter().zip(&direction).map(|(p, d)| p + d * length).collect();
+            let tried: Vec<Vec2> = flat
+                .iter()
+                .zip(&direction)
+                .map(|(p, d)| p + d * length)
+                .collect();
             let reached = cloth.energy(&tried);
             if reached < energy {
                 (flat, energy) = (tried, reached);
@@ -53,7 +65,9 @@ struct Cloth<'a> {
 impl Cloth<'_> {
     fn jacobian(&self, f: usize, flat: &[Vec2]) -> Matrix2<f64> {
         let corners = self.mesh.faces[f].map(|v| flat[v as usize]);
-        (0..3).map(|k| corners[k] * self.gradients[f][k].transpose()).sum()
+        (0..3)
+            .map(|k| corners[k] * self.gradients[f][k].transpose())
+            .sum()
     }
 
     fn energy(&self, flat: &[Vec2]) -> f64 {
@@ -71,7 +85,10 @@ impl Cloth<'_> {
 
     /// The minimiser of the quadratic proxy Σ A ‖W (J − R)‖² around `flat`.
     fn step(&self, flat: &[Vec2]) -> Result<Vec<Vec2>, FlattenError> {
-        let singular = || FlattenError::Singular { stage: "symmetric Dirichlet", vertices: flat.len() };
+        let singular = || FlattenError::Singular {
+            stage: "symmetric Dirichlet",
+            vertices: flat.len(),
+        };
         let mut matrix = Symmetric::zero(2 * flat.len());
         let mut rhs = vec![[0.0]; 2 * flat.len()];
         for (f, face) in self.mesh.faces.iter().enumerate() {
@@ -81,10 +98,15 @@ impl Cloth<'_> {
                 for c in 0..2 {
                     let row: [(usize, f64); 6] = std::array::from_fn(|n| {
                         let (k, d) = (n / 2, n % 2);
-                        (2 * face[k] as usize + d, weight[(r, d)] * self.gradients[f][k][c])
+                        (
+                            2 * face[k] as usize + d,
+                            weight[(r, d)] * self.gradients[f][k][c],
+                        )
                     });
                     matrix.add_square(&row, self.rest[f].area);
-                    row.iter().for_each(|(i, coefficient)| rhs[*i][0] += self.rest[f].area * coefficient * goal[(r, c)]);
+                    row.iter().for_each(|(i, coefficient)| {
+                        rhs[*i][0] += self.rest[f].area * coefficient * goal[(r, c)]
+                    });
                 }
             }
         }
@@ -94,8 +116,13 @@ impl Cloth<'_> {
                 rhs[2 * v + d][0] += PROXIMAL * p[d];
             }
         }
-        matrix.factor().and_then(|factor| factor.solve(&mut rhs)).map_err(|_| singular())?;
-        Ok((0..flat.len()).map(|v| Vec2::new(rhs[2 * v][0], rhs[2 * v + 1][0])).collect())
+        matrix
+            .factor()
+            .and_then(|factor| factor.solve(&mut rhs))
+            .map_err(|_| singular())?;
+        Ok((0..flat.len())
+            .map(|v| Vec2::new(rhs[2 * v][0], rhs[2 * v + 1][0]))
+            .collect())
     }
 
     /// The smallest positive step along `direction` at which a face loses its area.
@@ -116,7 +143,11 @@ fn proxy(j: &Matrix2<f64>) -> Option<(Matrix2<f64>, Matrix2<f64>)> {
     let (u, vt) = (svd.u?, svd.v_t?);
     let weight = svd.singular_values.map(|s| {
         let s = s.max(1e-8);
-        if (s - 1.0).abs() < 1e-6 { 2.0 } else { ((s - s.powi(-3)) / (s - 1.0)).sqrt() }
+        if (s - 1.0).abs() < 1e-6 {
+            2.0
+        } else {
+            ((s - s.powi(-3)) / (s - 1.0)).sqrt()
+        }
     });
     Some((u * Matrix2::from_diagonal(&weight) * u.transpose(), u * vt))
 }
@@ -148,10 +179,16 @@ mod tests {
     fn a_squashed_square_is_relaxed_to_its_rest_shape() {
         let positions = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
         let mesh = TriMesh {
-            positions: positions.iter().map(|p| crate::mesh::Vec3::new(p.0, p.1, 0.0)).collect(),
+            positions: positions
+                .iter()
+                .map(|p| crate::mesh::Vec3::new(p.0, p.1, 0.0))
+                .collect(),
             faces: vec![[0, 1, 2], [0, 2, 3]],
         };
-        let start: Vec<Vec2> = positions.iter().map(|p| Vec2::new(3.0 * p.0, 0.2 * p.1 + 0.5 * p.0)).collect();
+        let start: Vec<Vec2> = positions
+            .iter()
+            .map(|p| Vec2::new(3.0 * p.0, 0.2 * p.1 + 0.5 * p.0))
+            .collect();
         let (flat, _) = minimise(&mesh, &RestTriangle::of(&mesh), &start).unwrap();
         for (a, b) in [(0, 1), (1, 2), (2, 3), (3, 0)] {
             assert!(((flat[a] - flat[b]).norm() - 1.0).abs() < 0.01);

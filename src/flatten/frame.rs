@@ -23,11 +23,13 @@ impl Frame {
             let angle = std::f64::consts::FRAC_PI_2 * k as f64 / DIRECTIONS as f64;
             Self::along(Vec2::new(angle.cos(), angle.sin()), points)
         });
-        candidates.min_by(|a, b| a.side.total_cmp(&b.side)).unwrap_or(Frame {
-            origin: Vec2::zeros(),
-            axis: Vec2::x(),
-            side: 1.0,
-        })
+        candidates
+            .min_by(|a, b| a.side.total_cmp(&b.side))
+            .unwrap_or(Frame {
+                origin: Vec2::zeros(),
+                axis: Vec2::x(),
+                side: 1.0,
+            })
     }
 
     fn along(axis: Vec2, points: &[Vec2]) -> Frame {
@@ -41,7 +43,11 @@ impl Frame {
         let extent = high - low;
         let side = extent.max();
         let corner = low - (Vec2::repeat(side) - extent) / 2.0;
-        Frame { origin: axis * corner.x + up * corner.y, axis, side }
+        Frame {
+            origin: axis * corner.x + up * corner.y,
+            axis,
+            side,
+        }
     }
 
     /// Chart point to uv.
@@ -79,7 +85,9 @@ mod tests {
 
     #[test]
     fn a_turned_square_is_found() {
-        let turned: Vec<Vec2> = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)].map(Vec2::from_tuple).to_vec();
+        let turned: Vec<Vec2> = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)]
+            .map(Vec2::from_tuple)
+            .to_vec();
         assert!((Frame::tightest(&turned).side - 2f64.sqrt()).abs() < 1e-9);
     }
 

@@ -32,7 +32,9 @@ impl Default for Limits {
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum FlattenError {
     /// The sparse system of a stage had no positive definite factor: the region's triangles are degenerate.
-    #[error("the {stage} system of a region of {vertices} vertices cannot be solved; its triangles are degenerate")]
+    #[error(
+        "the {stage} system of a region of {vertices} vertices cannot be solved; its triangles are degenerate"
+    )]
     Singular {
         /// Which stage's system.
         stage: &'static str,
@@ -40,7 +42,9 @@ pub enum FlattenError {
         vertices: usize,
     },
     /// The chart stretches the cloth beyond the limit.
-    #[error("mean stretch {stretch:.2} exceeds {limit:.2}; the surface around the hole is not cloth-like")]
+    #[error(
+        "mean stretch {stretch:.2} exceeds {limit:.2}; the surface around the hole is not cloth-like"
+    )]
     TooStretched {
         /// Mean over edges of max(r, 1/r).
         stretch: f64,
@@ -48,7 +52,9 @@ pub enum FlattenError {
         limit: f64,
     },
     /// Faces stay flipped even with the flip-free energy.
-    #[error("{flipped} of {faces} faces flip in the chart; the surface around the hole is not cloth-like")]
+    #[error(
+        "{flipped} of {faces} faces flip in the chart; the surface around the hole is not cloth-like"
+    )]
     Flipped {
         /// Faces that are upside down.
         flipped: usize,
@@ -90,7 +96,10 @@ impl Chart {
 pub fn flatten(region: &Region, limits: &Limits) -> Result<Chart, FlattenError> {
     let mesh = &region.mesh;
     let rest = RestTriangle::of(mesh);
-    let loops: Vec<&[u32]> = std::iter::once(&region.rim).chain(&region.holes).map(Vec::as_slice).collect();
+    let loops: Vec<&[u32]> = std::iter::once(&region.rim)
+        .chain(&region.holes)
+        .map(Vec::as_slice)
+        .collect();
     let start = tutte::embed(mesh, &region.outer, &loops)?;
     let (mut flat, mut rounds) = arap::minimise(mesh, &rest, &start)?;
     if flipped(mesh, &flat) > 0 {
@@ -98,19 +107,35 @@ pub fn flatten(region: &Region, limits: &Limits) -> Result<Chart, FlattenError> 
     }
     let flips = flipped(mesh, &flat);
     if flips > 0 {
-        return Err(FlattenError::Flipped { flipped: flips, faces: mesh.faces.len() });
+        return Err(FlattenError::Flipped {
+            flipped: flips,
+            faces: mesh.faces.len(),
+        });
     }
     let (stretch_mean, stretch_max) = stretch(mesh, &flat);
     if stretch_mean > limits.mean_stretch {
-        return Err(FlattenError::TooStretched { stretch: stretch_mean, limit: limits.mean_stretch });
+        return Err(FlattenError::TooStretched {
+            stretch: stretch_mean,
+            limit: limits.mean_stretch,
+        });
     }
     let frame = Frame::tightest(&flat);
-    Ok(Chart { flat, frame, stretch_mean, stretch_max, flipped: flips, rounds })
+    Ok(Chart {
+        flat,
+        frame,
+        stretch_mean,
+        stretch_max,
+        flipped: flips,
+        rounds,
+    })
 }
 
 /// Faces whose area in the plane is not positive.
 fn flipped(mesh: &TriMesh, flat: &[Vec2]) -> usize {
-    mesh.faces.iter().filter(|f| doubled_area(f, flat) <= 0.0).count()
+    mesh.faces
+        .iter()
+        .filter(|f| doubled_area(f, flat) <= 0.0)
+        .count()
 }
 
 /// Twice the signed area of a face in the plane.
@@ -159,7 +184,10 @@ impl RestTriangle {
             let length = ab.norm().max(f64::MIN_POSITIVE);
             let x = ac.dot(&ab) / length;
             let longest = length.max(ac.norm()).max((c - b).norm());
-            let y = (ac.norm_squared() - x * x).max(0.0).sqrt().max(Self::FLATTEST * longest);
+            let y = (ac.norm_squared() - x * x)
+                .max(0.0)
+                .sqrt()
+                .max(Self::FLATTEST * longest);
             Self::from_corners([Vec2::zeros(), Vec2::new(length, 0.0), Vec2::new(x, y)])
         };
         mesh.faces.iter().map(lay).collect()
@@ -167,12 +195,18 @@ impl RestTriangle {
 
     /// The rest triangle with the given counter-clockwise corners.
     pub fn from_corners(corners: [Vec2; 3]) -> RestTriangle {
-        let doubled = (corners[1] - corners[0]).perp(&(corners[2] - corners[0])).max(f64::MIN_POSITIVE);
+        let doubled = (corners[1] - corners[0])
+            .perp(&(corners[2] - corners[0]))
+            .max(f64::MIN_POSITIVE);
         let cotangent = [0, 1, 2].map(|k: usize| {
             let (a, b, opposite) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]);
             (a - opposite).dot(&(b - opposite)) / doubled
         });
-        RestTriangle { corners, cotangent, area: 0.5 * doubled }
+        RestTriangle {
+            corners,
+            cotangent,
+            area: 0.5 * doubled,
+        }
     }
 
     /// Gradients gₖ of the three hat functions: the Jacobian of a map with corner values uₖ is Σ uₖ gₖᵀ.

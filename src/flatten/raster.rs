@@ -20,11 +20,13 @@ pub fn raster(mesh: &TriMesh, chart: &Chart) -> Grid {
         for j in cells(low.y, high.y) {
             for i in cells(low.x, high.x) {
                 let p = Vec2::new(i as f64, j as f64);
-                let weights = [1, 2, 0].map(|k: usize| (uv[(k + 1) % 3] - uv[k]).perp(&(p - uv[k])) / area);
+                let weights =
+                    [1, 2, 0].map(|k: usize| (uv[(k + 1) % 3] - uv[k]).perp(&(p - uv[k])) / area);
                 let cell = cell_index(i, j);
                 if !grid.known[cell] && weights.iter().all(|w| *w >= -1e-9) {
                     let corners = face.map(|v| mesh.positions[v as usize]);
-                    grid.positions[cell] = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
+                    grid.positions[cell] =
+                        corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
                     grid.known[cell] = true;
                 }
             }

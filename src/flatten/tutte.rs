@@ -11,7 +11,10 @@ use crate::mesh::{TriMesh, Vec2};
 /// `outer` runs with the surface on its left. The circle's circumference is the outer loop's length, so the start is of the right size.
 pub fn embed(mesh: &TriMesh, outer: &[u32], loops: &[&[u32]]) -> Result<Vec<Vec2>, FlattenError> {
     let count = mesh.positions.len();
-    let singular = FlattenError::Singular { stage: "Tutte", vertices: count };
+    let singular = FlattenError::Singular {
+        stage: "Tutte",
+        vertices: count,
+    };
     let fixed = circle(mesh, outer);
     let mut unknown = vec![usize::MAX; count + loops.len()];
     let free = (0..count + loops.len()).filter(|v| *v >= count || fixed[*v].is_none());
@@ -39,8 +42,13 @@ pub fn embed(mesh: &TriMesh, outer: &[u32], loops: &[&[u32]]) -> Result<Vec<Vec2
         rim.iter().for_each(|v| join(count + k, *v as usize));
     }
     let factor = matrix.factor().map_err(|_| singular)?;
-    factor.solve(&mut rhs).map_err(|_| FlattenError::Singular { stage: "Tutte", vertices: count })?;
-    Ok((0..count).map(|v| fixed[v].unwrap_or_else(|| rhs[unknown[v]].into())).collect())
+    factor.solve(&mut rhs).map_err(|_| FlattenError::Singular {
+        stage: "Tutte",
+        vertices: count,
+    })?;
+    Ok((0..count)
+        .map(|v| fixed[v].unwrap_or_else(|| rhs[unknown[v]].into()))
+        .collect())
 }
 
 /// A spring of weight 1 from a free vertex to a fixed point.

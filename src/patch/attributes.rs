@@ -48,10 +48,18 @@ pub struct Dressed {
 /// Carries the columns over into the patch.
 pub fn dress(patch: &Patch, region: &Region, chart: &Chart, columns: &Columns) -> Dressed {
     let rim = rim_edges(patch, region, columns);
-    let labels: Vec<u32> = rim.iter().flatten().map(|e| e.island).collect::<std::collections::BTreeSet<_>>().into_iter().collect();
+    let labels: Vec<u32> = rim
+        .iter()
+        .flatten()
+        .map(|e| e.island)
+        .collect::<std::collections::BTreeSet<_>>()
+        .into_iter()
+        .collect();
     let faces = face_labels(patch, &rim, &labels);
-    let sheets: BTreeMap<u32, Vec<Vec<f64>>> =
-        labels.iter().map(|l| (*l, continued(*l, patch, region, chart, (columns, &rim)))).collect();
+    let sheets: BTreeMap<u32, Vec<Vec<f64>>> = labels
+        .iter()
+        .map(|l| (*l, continued(*l, patch, region, chart, (columns, &rim))))
+        .collect();
 
     let mut index = BTreeMap::new();
     let mut corners: Vec<Corner> = Vec::new();
@@ -64,11 +72,20 @@ pub fn dress(patch: &Patch, region: &Region, chart: &Chart, columns: &Columns) -
                 (None, Some(l)) => sheets[&l][vertex as usize].clone(),
                 (None, None) => vec![0.0; columns.width],
             };
-            corners.push(Corner { vertex, scan: own.or_else(|| at_rim.map(|v| columns.any[*v as usize])), values });
+            corners.push(Corner {
+                vertex,
+                scan: own.or_else(|| at_rim.map(|v| columns.any[*v as usize])),
+                values,
+            });
             corners.len() as u32 - 1
         })
     };
-    let faces = patch.faces.iter().zip(&faces).map(|(f, label)| f.map(|v| place(v, *label))).collect();
+    let faces = patch
+        .faces
+        .iter()
+        .zip(&faces)
+        .map(|(f, label)| f.map(|v| place(v, *label)))
+        .collect();
     Dressed { corners, faces }
 }
 
@@ -87,7 +104,9 @@ fn scan_vertex(rim: &[Option<RimEdge>], vertex: u32, island: u32) -> Option<u32>
         return None;
     }
     let of = |edge: Option<RimEdge>| edge.filter(|e| e.island == island);
-    of(rim[k]).map(|e| e.from).or_else(|| of(rim[(k + rim.len() - 1) % rim.len()]).map(|e| e.to))
+    of(rim[k])
+        .map(|e| e.from)
+        .or_else(|| of(rim[(k + rim.len() - 1) % rim.len()]).map(|e| e.to))
 }
 
 /// Islands of the texture: region faces joined where they share scan vertices; named by their lowest scan vertex.
@@ -118,15 +137,20 @@ fn rim_edges(patch: &Patch, region: &Region, columns: &Columns) -> Vec<Option<Ri
     let island = islands(columns);
     let count = patch.rim.len();
     // The face beside the rim runs along it the other way round.
-    let wanted: BTreeMap<(u32, u32), usize> =
-        (0..count).map(|k| ((patch.rim[(k + 1) % count], patch.rim[k]), k)).collect();
+    let wanted: BTreeMap<(u32, u32), usize> = (0..count)
+        .map(|k| ((patch.rim[(k + 1) % count], patch.rim[k]), k))
+        .collect();
     let mut edges = vec![None; count];
     for (face, corners) in region.mesh.faces.iter().zip(columns.corners) {
         let Some(corners) = corners else { continue };
         for k in 0..3 {
             if let Some(edge) = wanted.get(&(face[k], face[(k + 1) % 3])) {
                 let (to, from) = (corners[k], corners[(k + 1) % 3]);
-                edges[*edge] = Some(RimEdge { island: island[&from], from, to });
+                edges[*edge] = Some(RimEdge {
+                    island: island[&from],
+                    from,
+                    to,
+                });
             }
         }
     }
@@ -143,10 +167,19 @@ fn face_labels(patch: &Patch, rim: &[Option<RimEdge>], labels: &[u32]) -> Vec<Op
     let nearness: Vec<Vec<f64>> = labels
         .iter()
         .map(|label| {
-            let on = |k: usize| f64::from(u8::from(rim[k % rim.len()].is_some_and(|e| e.island == *label)));
-            let at_rim: Vec<[f64; 1]> = (0..rim.len()).map(|k| [0.5 * (on(k) + on(k + rim.len() - 1))]).collect();
+            let on = |k: usize| {
+                f64::from(u8::from(
+                    rim[k % rim.len()].is_some_and(|e| e.island == *label),
+                ))
+            };
+            let at_rim: Vec<[f64; 1]> = (0..rim.len())
+                .map(|k| [0.5 * (on(k) + on(k + rim.len() - 1))])
+                .collect();
             let extended = extension.as_ref().ok().and_then(|e| e.extend(&at_rim).ok());
-            extended.map_or_else(|| vec![0.0; patch.flat.len()], |x| x.into_iter().map(|[x]| x).collect())
+            extended.map_or_else(
+                || vec![0.0; patch.flat.len()],
+                |x| x.into_iter().map(|[x]| x).collect(),
+            )
         })
         .collect();
     let beside = |f: &[u32; 3]| {
@@ -157,9 +190,15 @@ fn face_labels(patch: &Patch, rim: &[Option<RimEdge>], labels: &[u32]) -> Vec<Op
     };
     let nearest = |f: &[u32; 3]| {
         let sum = |l: usize| f.iter().map(|v| nearness[l][*v as usize]).sum::<f64>();
-        (0..labels.len()).max_by(|a, b| sum(*a).total_cmp(&sum(*b)).then(b.cmp(a))).map(|l| labels[l])
+        (0..labels.len())
+            .max_by(|a, b| sum(*a).total_cmp(&sum(*b)).then(b.cmp(a)))
+            .map(|l| labels[l])
     };
-    patch.faces.iter().map(|f| beside(f).or_else(|| nearest(f))).collect()
+    patch
+        .faces
+        .iter()
+        .map(|f| beside(f).or_else(|| nearest(f)))
+        .collect()
 }
 
 /// One island's columns at every patch vertex: affine over the chart, plus the harmonic extension of the remainder at its rim.
@@ -180,17 +219,32 @@ fn continued(
         }
     }
     let fit = affine_fit(&samples, columns, patch);
-    let at = |p: &Vec2| -> Vec<f64> { (0..columns.width).map(|c| fit[(0, c)] + fit[(1, c)] * p.x + fit[(2, c)] * p.y).collect() };
-    let held: Vec<(u32, u32)> = (0..rim.len() as u32).filter_map(|k| Some((k, scan_vertex(rim, k, label)?))).collect();
+    let at = |p: &Vec2| -> Vec<f64> {
+        (0..columns.width)
+            .map(|c| fit[(0, c)] + fit[(1, c)] * p.x + fit[(2, c)] * p.y)
+            .collect()
+    };
+    let held: Vec<(u32, u32)> = (0..rim.len() as u32)
+        .filter_map(|k| Some((k, scan_vertex(rim, k, label)?)))
+        .collect();
     let vertices: Vec<u32> = held.iter().map(|(k, _)| *k).collect();
     let mut values: Vec<Vec<f64>> = patch.flat.iter().map(&at).collect();
     if let Ok(extension) = Extension::new(&patch.flat, &patch.faces, &vertices) {
-        let own: Vec<Vec<f64>> = held.iter().map(|(_, scan)| (columns.values)(*scan)).collect();
+        let own: Vec<Vec<f64>> = held
+            .iter()
+            .map(|(_, scan)| (columns.values)(*scan))
+            .collect();
         for c in 0..columns.width {
-            let left: Vec<[f64; 1]> =
-                own.iter().zip(&vertices).map(|(own, k)| [own[c] - values[*k as usize][c]]).collect();
+            let left: Vec<[f64; 1]> = own
+                .iter()
+                .zip(&vertices)
+                .map(|(own, k)| [own[c] - values[*k as usize][c]])
+                .collect();
             if let Ok(spread) = extension.extend(&left) {
-                values.iter_mut().zip(&spread).for_each(|(v, [d])| v[c] += d);
+                values
+                    .iter_mut()
+                    .zip(&spread)
+                    .for_each(|(v, [d])| v[c] += d);
             }
         }
     }
@@ -201,7 +255,13 @@ fn continued(
 fn affine_fit(samples: &BTreeMap<u32, Vec2>, columns: &Columns, patch: &Patch) -> DMatrix<f64> {
     let rim = patch.rim.len() as f64;
     let centre = patch.flat.iter().take(patch.rim.len()).sum::<Vec2>() / rim;
-    let size = patch.flat.iter().take(patch.rim.len()).map(|p| (p - centre).norm_squared()).sum::<f64>() / rim;
+    let size = patch
+        .flat
+        .iter()
+        .take(patch.rim.len())
+        .map(|p| (p - centre).norm_squared())
+        .sum::<f64>()
+        / rim;
     let mut normal = Matrix3::zeros();
     let mut rhs = nalgebra::Matrix3xX::zeros(columns.width);
     for (scan, p) in samples {
@@ -214,8 +274,12 @@ fn affine_fit(samples: &BTreeMap<u32, Vec2>, columns: &Columns, patch: &Patch) -
         }
     }
     // A touch of ridge: a single line of samples leaves one slope open, which then is zero.
-    normal += Matrix3::from_diagonal(&nalgebra::Vector3::new(0.0, 1e-9, 1e-9)) * normal.trace().max(f64::MIN_POSITIVE);
-    let solution = normal.try_inverse().map_or_else(|| DMatrix::zeros(3, columns.width), |inverse| DMatrix::from_fn(3, columns.width, |r, c| (inverse * rhs.column(c))[r]));
+    normal += Matrix3::from_diagonal(&nalgebra::Vector3::new(0.0, 1e-9, 1e-9))
+        * normal.trace().max(f64::MIN_POSITIVE);
+    let solution = normal.try_inverse().map_or_else(
+        || DMatrix::zeros(3, columns.width),
+        |inverse| DMatrix::from_fn(3, columns.width, |r, c| (inverse * rhs.column(c))[r]),
+    );
     // Back from centred, scaled coordinates to the chart's.
     let scale = size.sqrt().max(f64::MIN_POSITIVE);
     DMatrix::from_fn(3, columns.width, |r, c| match r {

@@ -26,7 +26,13 @@ pub struct Elastics {
 
 impl Default for Elastics {
     fn default() -> Self {
-        Elastics { strain: 0.01, bending: 0.6, rest_curvature: 0.5, tether: 30.0, rounds: 60 }
+        Elastics {
+            strain: 0.002,
+            bending: 0.25,
+            rest_curvature: 0.25,
+            tether: 100.0,
+            rounds: 60,
+        }
     }
 }
 
@@ -44,15 +50,30 @@ pub struct Sheet<'a> {
 ///
 /// # Errors
 /// `NotPositive` when the triangles at rest are degenerate.
-pub fn relax(sheet: &Sheet, positions: &mut [Vec3], elastics: &Elastics) -> Result<usize, NotPositive> {
+pub fn relax(
+    sheet: &Sheet,
+    positions: &mut [Vec3],
+    elastics: &Elastics,
+) -> Result<usize, NotPositive> {
     if sheet.free == 0 {
         return Ok(0);
     }
-    let triangles: Vec<Triangle> = sheet.faces.iter().map(|f| Triangle::at_rest(f, sheet.rest)).collect();
+    let triangles: Vec<Triangle> = sheet
+        .faces
+        .iter()
+        .map(|f| Triangle::at_rest(f, sheet.rest))
+        .collect();
     let edge = mean_edge(&triangles);
     let mut steady = bending_rows(sheet, &triangles, positions, elastics);
-    steady.iter_mut().for_each(|row| row.weight *= (elastics.bending * edge).powi(2));
-    steady.extend(tether_rows(sheet, &triangles, positions, (elastics.tether * edge).powi(-2)));
+    steady
+        .iter_mut()
+        .for_each(|row| row.weight *= (elastics.bending * edge).powi(2));
+    steady.extend(tether_rows(
+        sheet,
+        &triangles,
+        positions,
+        (elastics.tether * edge).powi(-2),
+    ));
 
     let mut matrix = Symmetric::zero(sheet.free);
     let mut constant = vec![[0.0; 3]; sheet.free];
@@ -61,8 +82,15 @@ pub fn relax(sheet: &Sheet, positions: &mut [Vec3], elastics: &Elastics) -> Resu
     }
     for (face, triangle) in sheet.faces.iter().zip(&triangles) {
         for c in 0..2 {
-            let terms = (0..3).map(|k| (face[k] as usize, triangle.gradient[k][c])).collect();
-            Row { terms, weight: triangle.area, target: Vec3::zeros() }.add_to(&mut matrix, &mut constant, sheet.free, positions);
+            let terms = (0..3)
+                .map(|k| (face[k] as usize, triangle.gradient[k][c]))
+                .collect();
+            Row {
+                terms,
+                weight: triangle.area,
+                target: Vec3::zeros(),
+            }
+            .add_to(&mut matrix, &mut constant, sheet.free, positions);
         }
     }
     let factor = matrix.factor()?;
@@ -94,9 +122,17 @@ struct Row {
 
 impl Row {
     /// Adds the term to the normal equations of the free vertices; the others stay where `positions` has them.
-    fn add_to(&self, matrix: &mut Symmetric, rhs: &mut [[f64; 3]], free: usize, positions: &[Vec3]) {
+    fn add_to(
+        &self,
+        matrix: &mut Symmetric,
+        rhs: &mut [[f64; 3]],
+        free: usize,
+        positions: &[Vec3],
+    ) {
         let (moving, held): (Vec<_>, Vec<_>) = self.terms.iter().partition(|(v, _)| *v < free);
-        let goal = held.iter().fold(self.target, |goal, (v, c)| goal - positions[*v] * *c);
+        let goal = held
+            .iter()
+            .fold(self.target, |goal, (v, c)| goal - positions[*v] * *c);
         matrix.add_square(&moving, self.weight);
         for (v, c) in moving {
             (0..3).for_each(|d| rhs[v][d] += self.weight * c * goal[d]);
@@ -115,12 +151,18 @@ struct Triangle {
 impl Triangle {
     fn at_rest(face: &[u32; 3], rest: &[Vec2]) -> Triangle {
         let rest = RestTriangle::from_corners(face.map(|v| rest[v as usize]));
-        Triangle { gradient: rest.gradients(), area: rest.area, rest }
+        Triangle {
+            gradient: rest.gradients(),
+            area: rest.area,
+            rest,
+        }
     }
 
     /// The deformation gradient with its singular values brought within 1 ± `strain`.
     fn within(&self, face: &[u32; 3], positions: &[Vec3], strain: f64) -> Matrix3x2<f64> {
-        let f: Matrix3x2<f64> = (0..3).map(|k| positions[face[k] as usize] * self.gradient[k].transpose()).sum();
+        let f: Matrix3x2<f64> = (0..3)
+            .map(|k| positions[face[k] as usize] * self.gradient[k].transpose())
+            .sum();
         let limited = |square: f64| {
             let s = square.max(1e-12).sqrt();
             s.clamp(1.0 - strain, 1.0 + strain) / s
@@ -138,35 +180,66 @@ fn spectral(c: Matrix2<f64>, g: impl Fn(f64) -> f64) -> Matrix2<f64> {
         return Matrix2::identity() * high;
     }
     // g(C) = ½(g₊ + g₋) I + ½(g₊ − g₋) (C − mean I) / radius
-    (c - Matrix2::identity() * mean) * (0.5 * (high - low) / radius) + Matrix2::identity() * (0.5 * (high + low))
+    (c - Matrix2::identity() * mean) * (0.5 * (high - low) / radius)
+        + Matrix2::identity() * (0.5 * (high + low))
 }
+
+/// Triangles at rest flatter than this (doubled area ÷ longest edge squared) spoil the Laplacians of their corners.
+const FLATTEST: f64 = 1e-3;
 
 /// Discrete Laplacians (cotangent weights at rest, area-normalised) of the vertices whose fan is closed, as rows of weight area.
 ///
 /// The cloth's own bends around the hole go on through its rim, because the rim's rows reach over it. Inner rows ask for a share of the
 /// curvature that `positions` has now.
-fn bending_rows(sheet: &Sheet, triangles: &[Triangle], positions: &[Vec3], elastics: &Elastics) -> Vec<Row> {
+fn bending_rows(
+    sheet: &Sheet,
+    triangles: &[Triangle],
+    positions: &[Vec3],
+    elastics: &Elastics,
+) -> Vec<Row> {
     let count = sheet.rest.len();
-    let (mut area, mut angle, mut terms) = (vec![0.0; count], vec![0.0; count], vec![Vec::new(); count]);
+    let (mut area, mut angle, mut terms) =
+        (vec![0.0; count], vec![0.0; count], vec![Vec::new(); count]);
     for (face, triangle) in sheet.faces.iter().zip(triangles) {
         for k in 0..3 {
-            let (a, b, c) = (face[k] as usize, face[(k + 1) % 3] as usize, face[(k + 2) % 3] as usize);
+            let (a, b, c) = (
+                face[k] as usize,
+                face[(k + 1) % 3] as usize,
+                face[(k + 2) % 3] as usize,
+            );
             let half = 0.5 * triangle.rest.cotangent[k];
             terms[a].extend([(b, half), (a, -half)]);
             terms[b].extend([(a, half), (b, -half)]);
             area[a] += triangle.area / 3.0;
             let (to_b, to_c) = (sheet.rest[b] - sheet.rest[a], sheet.rest[c] - sheet.rest[a]);
-            angle[a] += to_b.perp(&to_c).atan2(to_b.dot(&to_c));
+            let longest = to_b.norm_squared().max(to_c.norm_squared());
+            // Where untangling the rim has turned a triangle of the scan over, there is no telling what unbent means.
+            let sound = to_b.perp(&to_c) > FLATTEST * longest;
+            angle[a] += if sound {
+                to_b.perp(&to_c).atan2(to_b.dot(&to_c))
+            } else {
+                f64::NAN
+            };
         }
     }
     let closed = |v: &usize| (angle[*v] - std::f64::consts::TAU).abs() < 1e-6;
     (0..count)
         .filter(closed)
         .map(|v| {
-            let terms: Vec<(usize, f64)> = merged(std::mem::take(&mut terms[v])).map(|(w, c)| (w, c / area[v])).collect();
+            let terms: Vec<(usize, f64)> = merged(std::mem::take(&mut terms[v]))
+                .map(|(w, c)| (w, c / area[v]))
+                .collect();
             let drawn: Vec3 = terms.iter().map(|(w, c)| positions[*w] * *c).sum();
-            let share = if v < sheet.free { elastics.rest_curvature } else { 0.0 };
-            Row { terms, weight: area[v], target: drawn * share }
+            let share = if v < sheet.free {
+                elastics.rest_curvature
+            } else {
+                0.0
+            };
+            Row {
+                terms,
+                weight: area[v],
+                target: drawn * share,
+            }
         })
         .collect()
 }
@@ -181,7 +254,13 @@ fn tether_rows(sheet: &Sheet, triangles: &[Triangle], positions: &[Vec3], weight
             }
         }
     }
-    (0..sheet.free).map(|v| Row { terms: vec![(v, 1.0)], weight: weight * area[v], target: positions[v] }).collect()
+    (0..sheet.free)
+        .map(|v| Row {
+            terms: vec![(v, 1.0)],
+            weight: weight * area[v],
+            target: positions[v],
+        })
+        .collect()
 }
 
 /// Terms with their coefficients summed per vertex, in order of vertex.
@@ -199,7 +278,9 @@ fn merged(mut terms: Vec<(usize, f64)>) -> impl Iterator<Item = (usize, f64)> {
 
 /// Mean edge length at rest.
 fn mean_edge(triangles: &[Triangle]) -> f64 {
-    let edges = triangles.iter().flat_map(|t| (0..3).map(|k| (t.rest.corners[(k + 1) % 3] - t.rest.corners[k]).norm()));
+    let edges = triangles
+        .iter()
+        .flat_map(|t| (0..3).map(|k| (t.rest.corners[(k + 1) % 3] - t.rest.corners[k]).norm()));
     edges.sum::<f64>() / (3 * triangles.len()).max(1) as f64
 }
 
@@ -211,8 +292,10 @@ mod tests {
     fn lattice(n: usize) -> (Vec<Vec2>, Vec<[u32; 3]>, usize) {
         let inner = |i: usize, j: usize| i > 0 && j > 0 && i < n && j < n;
         let cells = || (0..=n).flat_map(|j| (0..=n).map(move |i| (i, j)));
-        let order: Vec<(usize, usize)> =
-            cells().filter(|(i, j)| inner(*i, *j)).chain(cells().filter(|(i, j)| !inner(*i, *j))).collect();
+        let order: Vec<(usize, usize)> = cells()
+            .filter(|(i, j)| inner(*i, *j))
+            .chain(cells().filter(|(i, j)| !inner(*i, *j)))
+            .collect();
         let at = |i, j| order.iter().position(|c| *c == (i, j)).unwrap() as u32;
         let faces = (0..n)
             .flat_map(|j| (0..n).map(move |i| (i, j)))
@@ -221,7 +304,10 @@ mod tests {
                 [[a, b, c], [a, c, d]]
             })
             .collect();
-        let rest = order.iter().map(|(i, j)| Vec2::new(*i as f64, *j as f64)).collect();
+        let rest = order
+            .iter()
+            .map(|(i, j)| Vec2::new(*i as f64, *j as f64))
+            .collect();
         (rest, faces, (n - 1) * (n - 1))
     }
 
@@ -233,8 +319,21 @@ mod tests {
             p.z = -2.0;
             p.x += 0.4;
         }
-        let elastics = Elastics { tether: 1e4, rest_curvature: 0.0, ..Elastics::default() };
-        relax(&Sheet { rest: &rest, faces: &faces, free }, &mut positions, &elastics).unwrap();
+        let elastics = Elastics {
+            tether: 1e4,
+            rest_curvature: 0.0,
+            ..Elastics::default()
+        };
+        relax(
+            &Sheet {
+                rest: &rest,
+                faces: &faces,
+                free,
+            },
+            &mut positions,
+            &elastics,
+        )
+        .unwrap();
         for face in &faces {
             for k in 0..3 {
                 let (a, b) = (face[k] as usize, face[(k + 1) % 3] as usize);
@@ -249,7 +348,16 @@ mod tests {
         let (rest, faces, free) = lattice(6);
         let mut positions: Vec<Vec3> = rest.iter().map(|p| Vec3::new(p.x, 2.0, p.y)).collect();
         let before = positions.clone();
-        relax(&Sheet { rest: &rest, faces: &faces, free }, &mut positions, &Elastics::default()).unwrap();
+        relax(
+            &Sheet {
+                rest: &rest,
+                faces: &faces,
+                free,
+            },
+            &mut positions,
+            &Elastics::default(),
+        )
+        .unwrap();
         for (p, q) in positions.iter().zip(&before) {
             assert!((p - q).norm() < 1e-9);
         }

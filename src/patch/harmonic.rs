@@ -30,7 +30,9 @@ impl Extension {
     /// `NotPositive` when some vertex has no connection to a held one.
     pub fn new(flat: &[Vec2], faces: &[[u32; 3]], held: &[u32]) -> Result<Extension, NotPositive> {
         let mut role = vec![Role::Free(0); flat.len()];
-        held.iter().enumerate().for_each(|(k, v)| role[*v as usize] = Role::Held(k));
+        held.iter()
+            .enumerate()
+            .for_each(|(k, v)| role[*v as usize] = Role::Held(k));
         let mut free = 0;
         for r in &mut role {
             if let Role::Free(index) = r {
@@ -54,8 +56,17 @@ impl Extension {
                 }
             }
         }
-        let factor = if free > 0 { Some(matrix.factor()?) } else { None };
-        Ok(Extension { factor, role, pulls, free })
+        let factor = if free > 0 {
+            Some(matrix.factor()?)
+        } else {
+            None
+        };
+        Ok(Extension {
+            factor,
+            role,
+            pulls,
+            free,
+        })
     }
 
     /// Extends one row of values per held vertex to all vertices.
@@ -85,16 +96,28 @@ mod tests {
     #[test]
     fn a_linear_function_extends_to_itself() {
         let n = 6;
-        let flat: Vec<Vec2> = (0..n * n).map(|k| Vec2::new((k % n) as f64, (k / n) as f64)).collect();
+        let flat: Vec<Vec2> = (0..n * n)
+            .map(|k| Vec2::new((k % n) as f64, (k / n) as f64))
+            .collect();
         let faces: Vec<[u32; 3]> = (0..n - 1)
             .flat_map(|j| (0..n - 1).map(move |i| (j * n + i) as u32))
-            .flat_map(|a| [[a, a + 1, a + 1 + n as u32], [a, a + 1 + n as u32, a + n as u32]])
+            .flat_map(|a| {
+                [
+                    [a, a + 1, a + 1 + n as u32],
+                    [a, a + 1 + n as u32, a + n as u32],
+                ]
+            })
             .collect();
         let border = |p: &Vec2| p.min() == 0.0 || p.max() == (n - 1) as f64;
-        let held: Vec<u32> = (0..flat.len() as u32).filter(|v| border(&flat[*v as usize])).collect();
+        let held: Vec<u32> = (0..flat.len() as u32)
+            .filter(|v| border(&flat[*v as usize]))
+            .collect();
         let f = |p: &Vec2| [2.0 * p.x - p.y + 1.0];
         let values: Vec<[f64; 1]> = held.iter().map(|v| f(&flat[*v as usize])).collect();
-        let extended = Extension::new(&flat, &faces, &held).unwrap().extend(&values).unwrap();
+        let extended = Extension::new(&flat, &faces, &held)
+            .unwrap()
+            .extend(&values)
+            .unwrap();
         for (p, x) in flat.iter().zip(&extended) {
             assert!((x[0] - f(p)[0]).abs() < 0.02);
         }

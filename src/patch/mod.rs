@@ -7,6 +7,7 @@ mod cloth;
 mod harmonic;
 pub mod quality;
 mod triangulate;
+mod untangle;
 
 pub use cloth::Elastics;
 pub use triangulate::signed_area;
@@ -41,7 +42,10 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Options { most_vertices: 20_000, elastics: Elastics::default() }
+        Options {
+            most_vertices: 20_000,
+            elastics: Elastics::default(),
+        }
     }
 }
 
@@ -69,10 +73,18 @@ impl Patch {
             let (wa, wb) = ((b - p).perp(&(c - p)) / area, (c - p).perp(&(a - p)) / area);
             let weights = [wa, wb, 1.0 - wa - wb];
             if weights.iter().all(|w| *w >= -1e-9) {
-                return face.iter().zip(weights).map(|(v, w)| self.positions[*v as usize] * w).sum();
+                return face
+                    .iter()
+                    .zip(weights)
+                    .map(|(v, w)| self.positions[*v as usize] * w)
+                    .sum();
             }
         }
-        let nearest = (0..self.flat.len()).min_by(|a, b| (self.flat[*a] - p).norm().total_cmp(&(self.flat[*b] - p).norm()));
+        let nearest = (0..self.flat.len()).min_by(|a, b| {
+            (self.flat[*a] - p)
+                .norm()
+                .total_cmp(&(self.flat[*b] - p).norm())
+        });
         nearest.map_or_else(Vec3::zeros, |v| self.positions[v])
     }
 }
@@ -84,16 +96,38 @@ impl Patch {
 ///
 /// # Errors
 /// `RimCrosses` when the chart overlaps itself at the hole, `Singular` when triangles degenerate.
-pub fn build(region: &Region, chart: &Chart, filled: &[Vec3], options: &Options) -> Result<Patch, PatchError> {
+pub fn build(
+    region: &Region,
+    chart: &Chart,
+    filled: &[Vec3],
+    options: &Options,
+) -> Result<Patch, PatchError> {
     // The rim runs with the cloth on its left, so with the hole on its right: turned round it encloses the patch.
     let rim: Vec<u32> = region.rim.iter().rev().copied().collect();
     let polygon: Vec<Vec2> = rim.iter().map(|v| chart.flat[*v as usize]).collect();
-    let tiled = triangulate::triangulate(&polygon, median_edge(region, chart), options.most_vertices)?;
+    let polygon = untangle::untangled(&polygon).ok_or(PatchError::RimCrosses)?;
+    let mut tiled =
+        triangulate::triangulate(&polygon, median_edge(region, chart), options.most_vertices)?;
+    let edges = region
+        .mesh
+        .faces
+        .iter()
+        .flat_map(|f| (0..3).map(|k| (f[k].min(f[(k + 1) % 3]), f[k].max(f[(k + 1) % 3]))));
+    let edges: std::collections::HashSet<(u32, u32)> = edges.collect();
+    tiled.split_chords(rim.len(), |a, b| {
+        let (a, b) = (rim[a as usize], rim[b as usize]);
+        edges.contains(&(a.min(b), a.max(b)))
+    });
 
-    let mut positions: Vec<Vec3> =
-        tiled.points.iter().map(|p| grid::evaluate(filled, chart.frame.uv(*p))).collect();
+    let mut positions: Vec<Vec3> = tiled
+        .points
+        .iter()
+        .map(|p| grid::evaluate(filled, chart.frame.uv(*p)))
+        .collect();
     let own = |k: usize| region.mesh.positions[rim[k] as usize];
-    let gaps: Vec<[f64; 3]> = (0..rim.len()).map(|k| (own(k) - positions[k]).into()).collect();
+    let gaps: Vec<[f64; 3]> = (0..rim.len())
+        .map(|k| (own(k) - positions[k]).into())
+        .collect();
     let held: Vec<u32> = (0..rim.len() as u32).collect();
     let spread = harmonic::Extension::new(&tiled.points, &tiled.faces, &held)
         .and_then(|e| e.extend(&gaps))
@@ -104,27 +138,63 @@ pub fn build(region: &Region, chart: &Chart, filled: &[Vec3], options: &Options)
     for (k, p) in positions.iter_mut().take(rim.len()).enumerate() {
         *p = own(k);
     }
-    let mut patch = Patch { rim, flat: tiled.points, positions, faces: tiled.faces, strain_rounds: 0 };
+    let mut patch = Patch {
+        rim,
+        flat: tiled.points,
+        positions,
+        faces: tiled.faces,
+        strain_rounds: 0,
+    };
     patch.strain_rounds = limit_strain(&mut patch, region, chart, &options.elastics)?;
     Ok(patch)
 }
 
 /// Median edge length of the region in the plane: the scan's own resolution.
 fn median_edge(region: &Region, chart: &Chart) -> f64 {
-    let edge = |f: &[u32; 3], k: usize| (chart.flat[f[k] as usize] - chart.flat[f[(k + 1) % 3] as usize]).norm();
-    let mut edges: Vec<f64> = region.mesh.faces.iter().flat_map(|f| (0..3).map(move |k| edge(f, k))).collect();
+    let edge = |f: &[u32; 3], k: usize| {
+        (chart.flat[f[k] as usize] - chart.flat[f[(k + 1) % 3] as usize]).norm()
+    };
+    let mut edges: Vec<f64> = region
+        .mesh
+        .faces
+        .iter()
+        .flat_map(|f| (0..3).map(move |k| edge(f, k)))
+        .collect();
     let middle = edges.len() / 2;
-    if edges.is_empty() { 1.0 } else { *edges.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    if edges.is_empty() {
+        1.0
+    } else {
+        *edges.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
 }
 
 /// Relaxes the patch's inner vertices together with the triangles of the scan that touch its rim, which are held.
-fn limit_strain(patch: &mut Patch, region: &Region, chart: &Chart, elastics: &Elastics) -> Result<usize, PatchError> {
+fn limit_strain(
+    patch: &mut Patch,
+    region: &Region,
+    chart: &Chart,
+    elastics: &Elastics,
+) -> Result<usize, PatchError> {
     let (rim, count) = (patch.rim.len(), patch.positions.len());
     let free = count - rim;
     // Order for `relax`: inner vertices first, then the rim, then the scan's vertices around it.
-    let place = |v: u32| if (v as usize) < rim { v + free as u32 } else { v - rim as u32 };
-    let mut rest: Vec<Vec2> = patch.flat[rim..].iter().chain(&patch.flat[..rim]).copied().collect();
-    let mut positions: Vec<Vec3> = patch.positions[rim..].iter().chain(&patch.positions[..rim]).copied().collect();
+    let place = |v: u32| {
+        if (v as usize) < rim {
+            v + free as u32
+        } else {
+            v - rim as u32
+        }
+    };
+    let mut rest: Vec<Vec2> = patch.flat[rim..]
+        .iter()
+        .chain(&patch.flat[..rim])
+        .copied()
+        .collect();
+    let mut positions: Vec<Vec3> = patch.positions[rim..]
+        .iter()
+        .chain(&patch.positions[..rim])
+        .copied()
+        .collect();
     let mut faces: Vec<[u32; 3]> = patch.faces.iter().map(|f| f.map(place)).collect();
 
     let mut sheet_index = vec![u32::MAX; region.mesh.positions.len()];
@@ -144,8 +214,13 @@ fn limit_strain(patch: &mut Patch, region: &Region, chart: &Chart, elastics: &El
             sheet_index[v]
         }));
     }
-    let sheet = cloth::Sheet { rest: &rest, faces: &faces, free };
-    let rounds = cloth::relax(&sheet, &mut positions, elastics).map_err(|_| PatchError::Singular { stage: "strain" })?;
+    let sheet = cloth::Sheet {
+        rest: &rest,
+        faces: &faces,
+        free,
+    };
+    let rounds = cloth::relax(&sheet, &mut positions, elastics)
+        .map_err(|_| PatchError::Singular { stage: "strain" })?;
     patch.positions[rim..].copy_from_slice(&positions[..free]);
     Ok(rounds)
 }

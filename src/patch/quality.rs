@@ -44,8 +44,12 @@ pub fn measure(patch: &Patch, region: &Region) -> Quality {
         }
     }
     let inner = &angles[patch.rim.len()..];
-    let defects: f64 = inner.iter().map(|a| (std::f64::consts::TAU - a).abs()).sum();
-    let gap = |(k, v): (usize, &u32)| (patch.positions[k] - region.mesh.positions[*v as usize]).norm();
+    let defects: f64 = inner
+        .iter()
+        .map(|a| (std::f64::consts::TAU - a).abs())
+        .sum();
+    let gap =
+        |(k, v): (usize, &u32)| (patch.positions[k] - region.mesh.positions[*v as usize]).norm();
     Quality {
         area,
         stretch_mean: if edges == 0 { 1.0 } else { sum / edges as f64 },
@@ -61,7 +65,13 @@ pub fn joined(patch: &Patch, region: &Region) -> TriMesh {
     let mut mesh = region.mesh.clone();
     let (rim, base) = (patch.rim.len(), mesh.positions.len() as u32);
     mesh.positions.extend_from_slice(&patch.positions[rim..]);
-    let place = |v: u32| patch.rim.get(v as usize).copied().unwrap_or(base + v - rim as u32);
+    let place = |v: u32| {
+        patch
+            .rim
+            .get(v as usize)
+            .copied()
+            .unwrap_or(base + v - rim as u32)
+    };
     mesh.faces.extend(patch.faces.iter().map(|f| f.map(place)));
     mesh
 }

@@ -23,7 +23,11 @@ pub struct Triangulation {
 ///
 /// # Errors
 /// `RimCrosses` when the polygon crosses or touches itself.
-pub fn triangulate(polygon: &[Vec2], spacing: f64, most: usize) -> Result<Triangulation, PatchError> {
+pub fn triangulate(
+    polygon: &[Vec2],
+    spacing: f64,
+    most: usize,
+) -> Result<Triangulation, PatchError> {
     let area = signed_area(polygon);
     if area.is_nan() || area <= 0.0 {
         return Err(PatchError::RimCrosses);
@@ -36,16 +40,66 @@ pub fn triangulate(polygon: &[Vec2], spacing: f64, most: usize) -> Result<Triang
     Ok(Triangulation { points, faces })
 }
 
+impl Triangulation {
+    /// Splits every inner edge between two polygon corners that `taken` names, in the middle.
+    ///
+    /// A rim that comes back to itself can have two corners that are joined by an edge of the scan already; joined by the patch, too,
+    /// that edge would have four triangles.
+    pub fn split_chords(&mut self, corners: usize, taken: impl Fn(u32, u32) -> bool) {
+        let apart = |a: u32, b: u32| {
+            (a as usize + 1) % corners != b as usize && (b as usize + 1) % corners != a as usize
+        };
+        let chord = |faces: &[[u32; 3]]| {
+            faces
+                .iter()
+                .flat_map(|f| [(f[0], f[1]), (f[1], f[2]), (f[2], f[0])])
+                .find(|(a, b)| (*a.max(b) as usize) < corners && apart(*a, *b) && taken(*a, *b))
+        };
+        while let Some((a, b)) = chord(&self.faces) {
+            let middle = self.points.len() as u32;
+            self.points
+                .push((self.points[a as usize] + self.points[b as usize]) * 0.5);
+            let split = std::mem::take(&mut self.faces)
+                .into_iter()
+                .flat_map(|f| halves(f, (a, b), middle));
+            self.faces = split.collect();
+        }
+    }
+}
+
+/// The face itself, or its two halves if it has the edge, in either direction.
+fn halves(face: [u32; 3], edge: (u32, u32), middle: u32) -> Vec<[u32; 3]> {
+    let on = (0..3).find(|k| {
+        let (a, b) = (face[*k], face[(k + 1) % 3]);
+        (a, b) == edge || (b, a) == edge
+    });
+    match on {
+        None => vec![face],
+        Some(k) => {
+            let (a, b, c) = (face[k], face[(k + 1) % 3], face[(k + 2) % 3]);
+            vec![[a, middle, c], [middle, b, c]]
+        }
+    }
+}
+
 /// Signed area of a polygon (shoelace), positive when counter-clockwise.
 pub fn signed_area(polygon: &[Vec2]) -> f64 {
     let next = polygon.iter().cycle().skip(1);
-    0.5 * polygon.iter().zip(next).map(|(a, b)| a.perp(b)).sum::<f64>()
+    0.5 * polygon
+        .iter()
+        .zip(next)
+        .map(|(a, b)| a.perp(b))
+        .sum::<f64>()
 }
 
 /// Points of a triangular lattice inside the polygon, clear of its edges.
 fn lattice(polygon: &[Vec2], spacing: f64) -> Vec<Vec2> {
     let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
-    let tree = RTree::bulk_load(edges.map(|(a, b)| Line::new([a.x, a.y], [b.x, b.y])).collect());
+    let tree = RTree::bulk_load(
+        edges
+            .map(|(a, b)| Line::new([a.x, a.y], [b.x, b.y]))
+            .collect(),
+    );
     let low = polygon.iter().fold(polygon[0], |m, p| m.inf(p));
     let high = polygon.iter().fold(polygon[0], |m, p| m.sup(p));
     let rise = spacing * 0.75f64.sqrt();
@@ -100,10 +154,19 @@ impl HasPosition for Indexed {
 
 /// Delaunay triangles inside the polygon made of the first `rim` points.
 fn constrained_delaunay(points: &[Vec2], rim: usize) -> Result<Vec<[u32; 3]>, PatchError> {
-    let vertices = (0u32..).zip(points).map(|(index, p)| Indexed { at: Point2::new(p.x, p.y), index }).collect();
+    let vertices = (0u32..)
+        .zip(points)
+        .map(|(index, p)| Indexed {
+            at: Point2::new(p.x, p.y),
+            index,
+        })
+        .collect();
     let edges = (0..rim).map(|k| [k, (k + 1) % rim]).collect();
     let mut crossed = false;
-    let cdt = ConstrainedDelaunayTriangulation::<Indexed>::try_bulk_load_cdt(vertices, edges, |_| crossed = true)
+    let cdt =
+        ConstrainedDelaunayTriangulation::<Indexed>::try_bulk_load_cdt(vertices, edges, |_| {
+            crossed = true
+        })
         .map_err(|_| PatchError::RimCrosses)?;
     if crossed || cdt.num_vertices() != points.len() || cdt.num_constraints() != rim {
         return Err(PatchError::RimCrosses);
@@ -125,7 +188,10 @@ fn constrained_delaunay(points: &[Vec2], rim: usize) -> Result<Vec<[u32; 3]>, Pa
             continue;
         }
         faces.push(face.vertices().map(|v| v.data().index));
-        let across = face.adjacent_edges().into_iter().filter(|e| !e.is_constraint_edge());
+        let across = face
+            .adjacent_edges()
+            .into_iter()
+            .filter(|e| !e.is_constraint_edge());
         open.extend(across.filter_map(|e| e.rev().face().as_inner()));
     }
     // Triangle count of a polygon with inner points (Euler): anything else leaked or lost a piece.
@@ -148,7 +214,11 @@ mod tests {
 
     fn star(radii: &[f64]) -> Vec<Vec2> {
         let turn = std::f64::consts::TAU / radii.len() as f64;
-        radii.iter().enumerate().map(|(k, r)| Vec2::new((turn * k as f64).cos(), (turn * k as f64).sin()) * *r).collect()
+        radii
+            .iter()
+            .enumerate()
+            .map(|(k, r)| Vec2::new((turn * k as f64).cos(), (turn * k as f64).sin()) * *r)
+            .collect()
     }
 
     proptest! {
@@ -170,9 +240,41 @@ mod tests {
 
     #[test]
     fn a_figure_of_eight_is_refused() {
-        let eight = [(0.0, 0.0), (1.0, 1.0), (2.0, 0.0), (2.0, 1.5), (1.0, 0.5), (0.0, 1.5)];
+        let eight = [
+            (0.0, 0.0),
+            (1.0, 1.0),
+            (2.0, 0.0),
+            (2.0, 1.5),
+            (1.0, 0.5),
+            (0.0, 1.5),
+        ];
         let eight: Vec<Vec2> = eight.iter().map(|p| Vec2::new(p.0, p.1)).collect();
-        assert!(matches!(triangulate(&eight, 0.1, 1000), Err(PatchError::RimCrosses)));
+        assert!(matches!(
+            triangulate(&eight, 0.1, 1000),
+            Err(PatchError::RimCrosses)
+        ));
+    }
+
+    #[test]
+    fn a_taken_chord_is_split_and_the_tiling_stays() {
+        let polygon = star(&[1.0; 8]);
+        let mut tiled = triangulate(&polygon, 10.0, 100).unwrap();
+        let joined = |t: &Triangulation, a: u32, b: u32| {
+            t.faces.iter().any(|f| f.contains(&a) && f.contains(&b))
+        };
+        let pairs = (0..8)
+            .flat_map(|a| (a + 2..8).map(move |b| (a, b)))
+            .filter(|(a, b)| (a, b) != (&0, &7));
+        let (a, b) = pairs.clone().find(|(a, b)| joined(&tiled, *a, *b)).unwrap();
+        tiled.split_chords(8, |x, y| (x.min(y), x.max(y)) == (a, b));
+        assert!(!joined(&tiled, a, b));
+        assert_eq!(tiled.faces.len(), 8);
+        let area: f64 = tiled
+            .faces
+            .iter()
+            .map(|f| signed_area(&f.map(|v| tiled.points[v as usize])))
+            .sum();
+        assert!((area - signed_area(&polygon)).abs() < 1e-12);
     }
 
     #[test]
