@@ -37,7 +37,15 @@ pub fn glb(mesh: &Fresh) -> Result<Vec<u8>, ScanError> {
         accessors.len() - 1
     };
     let bound = |pick: fn(f32, f32) -> f32| -> Vec<f32> {
-        (0..3).map(|d| mesh.positions.iter().map(|p| p[d]).reduce(pick).unwrap_or(0.0)).collect()
+        (0..3)
+            .map(|d| {
+                mesh.positions
+                    .iter()
+                    .map(|p| p[d])
+                    .reduce(pick)
+                    .unwrap_or(0.0)
+            })
+            .collect()
     };
     let (low, high) = (bound(f32::min), bound(f32::max));
     let position = push(
@@ -45,14 +53,23 @@ pub fn glb(mesh: &Fresh) -> Result<Vec<u8>, ScanError> {
         34962,
         json!({"componentType": 5126, "type": "VEC3", "count": mesh.positions.len(), "min": low, "max": high}),
     );
-    let normal = push(bytes_of(mesh.normals), 34962, json!({"componentType": 5126, "type": "VEC3", "count": mesh.normals.len()}));
+    let normal = push(
+        bytes_of(mesh.normals),
+        34962,
+        json!({"componentType": 5126, "type": "VEC3", "count": mesh.normals.len()}),
+    );
     let mut attributes = json!({"POSITION": position, "NORMAL": normal});
     if !mesh.texcoords.is_empty() {
-        let texcoord = json!({"componentType": 5126, "type": "VEC2", "count": mesh.texcoords.len()});
+        let texcoord =
+            json!({"componentType": 5126, "type": "VEC2", "count": mesh.texcoords.len()});
         attributes["TEXCOORD_0"] = push(bytes_of(mesh.texcoords), 34962, texcoord).into();
     }
     let indices = push(
-        mesh.faces.iter().flatten().flat_map(|v| v.to_le_bytes()).collect(),
+        mesh.faces
+            .iter()
+            .flatten()
+            .flat_map(|v| v.to_le_bytes())
+            .collect(),
         34963,
         json!({"componentType": 5125, "type": "SCALAR", "count": 3 * mesh.faces.len()}),
     );
@@ -71,12 +88,17 @@ pub fn glb(mesh: &Fresh) -> Result<Vec<u8>, ScanError> {
         "bufferViews": views,
         "buffers": [{"byteLength": bin.len()}],
     });
-    pack_glb(document.to_string().as_bytes(), Some(&bin), &[])
-        .ok_or_else(|| ScanError::Addition { addition: 0, detail: "the file would pass 4 GiB".into() })
+    pack_glb(document.to_string().as_bytes(), Some(&bin), &[]).ok_or_else(|| ScanError::Addition {
+        addition: 0,
+        detail: "the file would pass 4 GiB".into(),
+    })
 }
 
 fn bytes_of<const N: usize>(rows: &[[f32; N]]) -> Vec<u8> {
-    rows.iter().flatten().flat_map(|x| x.to_le_bytes()).collect()
+    rows.iter()
+        .flatten()
+        .flat_map(|x| x.to_le_bytes())
+        .collect()
 }
 
 #[cfg(test)]
@@ -96,7 +118,10 @@ mod tests {
         };
         let scan = Scan::read(&glb(&fresh).unwrap(), &Limits::default()).unwrap();
         assert_eq!(scan.surface.faces, [[0, 1, 2]]);
-        assert_eq!(scan.surface.positions[2], crate::mesh::Vec3::new(0.0, 2.0, 0.5));
+        assert_eq!(
+            scan.surface.positions[2],
+            crate::mesh::Vec3::new(0.0, 2.0, 0.5)
+        );
         assert_eq!(*scan.parts[0].texcoords[0], fresh.texcoords[..]);
         assert_eq!(scan.mesh_name(0), Some("scarf"));
     }

@@ -104,8 +104,8 @@ pub struct Part {
     pub texcoords: Vec<Arc<[[f32; 2]]>>,
     /// COLOR_0, COLOR_1, … in the same way, linear RGBA; a set without alpha has alpha 1.
     pub colors: Vec<Arc<[[f32; 4]]>>,
-    /// Whether the primitive has normals; without, it is drawn flat.
-    pub has_normals: bool,
+    /// NORMAL as stored, in the node's space, `[vertices.len()]`; without, the primitive is drawn flat.
+    pub normals: Option<Arc<[[f32; 3]]>>,
     /// Whether darn made it: its `extras.darn.reconstructed` says so.
     pub reconstructed: bool,
     /// Whether several drawn nodes share this mesh: a patch written once then shows at each of them.
@@ -168,7 +168,8 @@ impl Scan {
     /// The name of a part's mesh, or of its node where the mesh has none.
     pub fn mesh_name(&self, part: usize) -> Option<&str> {
         let part = self.parts.get(part)?;
-        let name = |list: &str, index: usize| self.json.get(list)?.get(index)?.get("name")?.as_str();
+        let name =
+            |list: &str, index: usize| self.json.get(list)?.get(index)?.get("name")?.as_str();
         name("meshes", part.mesh).or_else(|| name("nodes", part.node))
     }
 

@@ -210,6 +210,7 @@ impl<'d, 'a> Reader<'d, 'a> {
                     [start + a, start + b, start + c]
                 }),
         );
+        let normals = self.normals(&attributes, count)?;
         let (texcoords, (color_kinds, colors)) = (
             self.texcoords(&attributes, count)?,
             self.colors(&attributes, count)?,
@@ -227,8 +228,9 @@ impl<'d, 'a> Reader<'d, 'a> {
             faces: first..self.surface.faces.len() as u32,
             texcoords,
             colors,
-            has_normals: attributes.get("NORMAL")?.is_some(),
-            reconstructed: place.value.pointer("/extras/darn/reconstructed") == Some(&Value::Bool(true)),
+            normals,
+            reconstructed: place.value.pointer("/extras/darn/reconstructed")
+                == Some(&Value::Bool(true)),
             shared: false,
             first_instance: false,
             targets: place
@@ -339,6 +341,24 @@ impl<'d, 'a> Reader<'d, 'a> {
         };
         self.faces = self.faces.saturating_add(faces);
         within(self.limits.max_faces, "max_faces", self.faces, pointer)
+    }
+
+    /// The normals, if there are any; NaN and infinities read as 0.
+    fn normals(
+        &mut self,
+        attributes: &Place<'a>,
+        vertices: usize,
+    ) -> Result<Option<Arc<[[f32; 3]]>>, ScanError> {
+        let Some(reference) = attributes.get("NORMAL")? else {
+            return Ok(None);
+        };
+        let (_, place) = self.document.root.referred("accessors", &reference)?;
+        let accessor = self.attribute(&place, &[Type::Vec3])?;
+        let normals: Arc<[_]> = (accessor.floats([0.0; 3])?.into_iter())
+            .map(|normal| normal.map(tame))
+            .collect();
+        same_count(&place, normals.len(), vertices)?;
+        Ok(Some(normals))
     }
 
     fn texcoords(

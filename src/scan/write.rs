@@ -149,7 +149,7 @@ impl<'s> Patch<'s> {
         {
             return Err(fail(format!("face {face:?} goes past the {n} points")));
         }
-        if look.has_normals {
+        if look.normals.is_some() {
             expect_count(addition.normals.len(), n, "normals").map_err(fail)?;
         }
         expect_count(
@@ -242,7 +242,7 @@ impl<'s> Patch<'s> {
             Some(bounds(&self.points)),
         );
         attributes.insert("POSITION".into(), position);
-        if self.look.has_normals {
+        if self.look.normals.is_some() {
             attributes.insert(
                 "NORMAL".into(),
                 floats(out, Type::Vec3, bytes_of(&self.normals()), None),
@@ -293,6 +293,7 @@ impl<'s> Patch<'s> {
     }
 
     /// Normals in the node's space, unit: the transpose of its linear part undoes the inverse transpose that renderers apply.
+    /// At the scan's own vertices they are the scan's own, so that light does not break where patch and scan meet.
     fn normals(&self) -> Vec<[f32; 3]> {
         let back = self.home.placement.linear.transpose();
         let unit = |normal: &Vec3| {
@@ -300,11 +301,23 @@ impl<'s> Patch<'s> {
                 .try_normalize(f64::MIN_POSITIVE)
                 .unwrap_or_else(Vec3::z)
         };
-        self.addition
-            .normals
-            .iter()
-            .map(|normal| unit(normal).map(|x| x as f32).into())
+        (self.addition.points.iter())
+            .zip(&self.addition.normals)
+            .map(|(point, normal)| {
+                self.stored_normal(point)
+                    .unwrap_or_else(|| unit(normal).map(|x| x as f32).into())
+            })
             .collect()
+    }
+
+    /// The scan's normal at a patch point that is one of the look's own vertices, unless it is zero.
+    fn stored_normal(&self, point: &PatchPoint) -> Option<[f32; 3]> {
+        let PatchPoint::Scan(vertex) = *point else {
+            return None;
+        };
+        let at = vertex.checked_sub(self.look.vertices.start)? as usize;
+        let stored = *self.look.normals.as_ref()?.get(at)?;
+        (self.look.node == self.home.node && stored != [0.0; 3]).then_some(stored)
     }
 
     /// Appends the triangles, turned round where the node's transform will turn them again.

@@ -183,7 +183,7 @@ fn a_patch_reads_back_where_it_was_put() {
         &[[0.1, 0.2, 0.3, 1.0]; 4],
         "VEC3 like its neighbour"
     );
-    assert!(patch.has_normals);
+    assert!(patch.normals.is_some());
     let (positions, indices) = witness(&out);
     assert_eq!((positions.len(), indices.len()), (4, 9));
     assert_eq!(positions[1], [1.0, 0.0, 0.0]);
