@@ -53,8 +53,12 @@ pub struct Scanned {
 pub fn scanned(sheet: &Sheet, side: usize, hole: &Hole, rng: &mut impl Rng) -> Scanned {
     let spline = Spline::new(sheet);
     let (rest, faces) = irregular(side, rng);
-    let positions: Vec<Vec3> = rest.iter().map(|p| spline.at([p.x as f32, p.y as f32]).cast()).collect();
-    let ragged: [[f64; 2]; 6] = std::array::from_fn(|_| [rng.random_range(-0.3..0.3), rng.random_range(-0.3..0.3)]);
+    let positions: Vec<Vec3> = rest
+        .iter()
+        .map(|p| spline.at([p.x as f32, p.y as f32]).cast())
+        .collect();
+    let ragged: [[f64; 2]; 6] =
+        std::array::from_fn(|_| [rng.random_range(-0.3..0.3), rng.random_range(-0.3..0.3)]);
     let gone = |f: &[u32; 3]| {
         let centre = f.iter().map(|v| rest[*v as usize]).sum::<Vec2>() / 3.0;
         inside(hole, &ragged, centre)
@@ -62,7 +66,11 @@ pub fn scanned(sheet: &Sheet, side: usize, hole: &Hole, rng: &mut impl Rng) -> S
     let (lost, kept): (Vec<[u32; 3]>, Vec<[u32; 3]>) = faces.into_iter().partition(gone);
     let (mesh, used) = compact(&positions, &kept);
     let (lost, _) = compact(&positions, &lost);
-    Scanned { mesh, rest: used.into_iter().map(|v| rest[v as usize]).collect(), lost }
+    Scanned {
+        mesh,
+        rest: used.into_iter().map(|v| rest[v as usize]).collect(),
+        lost,
+    }
 }
 
 /// Jittered lattice points and evenly spaced border points of the unit square, Delaunay-triangulated.
@@ -71,7 +79,12 @@ fn irregular(side: usize, rng: &mut impl Rng) -> (Vec<Vec2>, Vec<[u32; 3]>) {
     let mut points: Vec<Vec2> = (0..side)
         .flat_map(|k| {
             let t = k as f64 / n;
-            [Vec2::new(t, 0.0), Vec2::new(1.0, t), Vec2::new(1.0 - t, 1.0), Vec2::new(0.0, 1.0 - t)]
+            [
+                Vec2::new(t, 0.0),
+                Vec2::new(1.0, t),
+                Vec2::new(1.0 - t, 1.0),
+                Vec2::new(0.0, 1.0 - t),
+            ]
         })
         .collect();
     for k in 0..side * side {
@@ -83,8 +96,14 @@ fn irregular(side: usize, rng: &mut impl Rng) -> (Vec<Vec2>, Vec<[u32; 3]>) {
         // Finite and within the unit square: never refused.
         let _ = triangulation.insert(Point2::new(p.x, p.y));
     }
-    let at: Vec<Vec2> = triangulation.vertices().map(|v| Vec2::new(v.position().x, v.position().y)).collect();
-    let faces = triangulation.inner_faces().map(|f| f.vertices().map(|v| v.fix().index() as u32)).collect();
+    let at: Vec<Vec2> = triangulation
+        .vertices()
+        .map(|v| Vec2::new(v.position().x, v.position().y))
+        .collect();
+    let faces = triangulation
+        .inner_faces()
+        .map(|f| f.vertices().map(|v| v.fix().index() as u32))
+        .collect();
     (at, faces)
 }
 
@@ -94,10 +113,17 @@ fn inside(hole: &Hole, ragged: &[[f64; 2]; 6], p: Vec2) -> bool {
         Hole::Blob { centre, radius } => {
             let d = p - centre;
             let angle = d.y.atan2(d.x);
-            let waves = ragged.iter().zip(1..).map(|([a, b], k)| (a * (angle * f64::from(k)).cos() + b * (angle * f64::from(k)).sin()) / f64::from(k));
+            let waves = ragged.iter().zip(1..).map(|([a, b], k)| {
+                (a * (angle * f64::from(k)).cos() + b * (angle * f64::from(k)).sin()) / f64::from(k)
+            });
             d.norm() < radius * (1.0 + waves.sum::<f64>()).max(0.3)
         }
-        Hole::Slit { centre, length, width, angle } => {
+        Hole::Slit {
+            centre,
+            length,
+            width,
+            angle,
+        } => {
             let (d, (s, c)) = (p - centre, angle.sin_cos());
             ((c * d.x + s * d.y) / length).powi(2) + ((c * d.y - s * d.x) / width).powi(2) < 1.0
         }
@@ -115,5 +141,11 @@ fn compact(positions: &[Vec3], faces: &[[u32; 3]]) -> (TriMesh, Vec<u32>) {
         }
     }
     let faces = faces.iter().map(|f| f.map(|v| place[v as usize])).collect();
-    (TriMesh { positions: used.iter().map(|v| positions[*v as usize]).collect(), faces }, used)
+    (
+        TriMesh {
+            positions: used.iter().map(|v| positions[*v as usize]).collect(),
+            faces,
+        },
+        used,
+    )
 }

@@ -1,0 +1,160 @@
+//! Training: samples to batches, the losses, AdamW with averaged weights, checkpoints, held-out scores.
+//! Generic over burn's autodiff backend; knows the network and where samples come from.
+//! No cloth simulation, no HTTP: sheets come from `scarffolds`, and nothing here is reached by a request.
+
+pub mod batch;
+pub mod checkpoint;
+pub mod loss;
+pub mod optimiser;
+pub mod score;
+pub mod trainer;
+
+#[cfg(test)]
+mod tests;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use burn::backend::{Autodiff, Flex};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+use crate::net::{FrameKind, NetError, UnetConfig};
+use crate::scarffolds;
+use crate::scarffolds::samples::{Sampler, Turning};
+
+pub use crate::scarffolds::samples::Sample;
+pub use loss::LossWeights;
+pub use score::Score;
+pub use trainer::{Progress, Sources, Summary};
+
+/// Samples that scores are measured on.
+const HELD_OUT_SAMPLES: usize = 64;
+/// Stream of the generator that draws the held-out samples; fixed, so that all runs are measured on the same ones.
+const HELD_OUT_SEED: u64 = 0x5ca1_ab1e;
+
+/// Why training stopped.
+#[derive(Debug, thiserror::Error)]
+pub enum TrainError {
+    #[error("{path}: {source}")]
+    File {
+        path: PathBuf,
+        source: std::io::Error,
+    },
+    #[error("sheets in {path}: {reason}")]
+    Sheets { path: PathBuf, reason: String },
+    #[error(transparent)]
+    Net(#[from] NetError),
+    #[error("checkpoint {path}: {reason}")]
+    Checkpoint { path: PathBuf, reason: String },
+    #[error("the loss is not finite at step {step}; a lower learning rate may help")]
+    Diverged { step: u64 },
+    #[error("{0}")]
+    Options(String),
+    #[error("the sample threads stopped")]
+    NoSamples,
+}
+
+/// What to train, on what, for how long.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct TrainOptions {
+    /// Name on the model card.
+    pub name: String,
+    /// Directory of sheets to learn from.
+    pub sheets: PathBuf,
+    /// Directory of sheets to be measured on; none of them may be in `sheets`.
+    pub held_out: PathBuf,
+    /// Where checkpoints, curves and weights go.
+    pub out: PathBuf,
+    /// Continue from the checkpoint in `out`.
+    pub resume: Start,
+    /// The network.
+    pub network: UnetConfig,
+    /// Weights of the loss's terms.
+    pub loss: LossWeights,
+    /// Samples a step.
+    pub batch: usize,
+    /// Highest learning rate.
+    pub rate: f64,
+    /// How long; the learning rate falls to zero at the end.
+    pub minutes: f64,
+    /// Minutes between checkpoints, scores and exported weights.
+    pub every: f64,
+    /// Seed of weights and samples.
+    pub seed: u64,
+    /// Threads that make samples.
+    pub sample_threads: usize,
+}
+
+/// Where a run starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Start {
+    /// From random weights.
+    Fresh,
+    /// From the checkpoint in the output directory.
+    Resume,
+}
+
+impl Default for TrainOptions {
+    fn default() -> Self {
+        TrainOptions {
+            name: "standard".into(),
+            sheets: "sheets/train".into(),
+            held_out: "sheets/held".into(),
+            out: "train".into(),
+            resume: Start::Fresh,
+            network: UnetConfig::default(),
+            loss: LossWeights::default(),
+            batch: 16,
+            rate: 1e-3,
+            minutes: 60.0,
+            every: 5.0,
+            seed: 1,
+            sample_threads: 1,
+        }
+    }
+}
+
+/// Trains on the CPU (burn-flex) with the sheets in `options.sheets`, reporting after every step.
+///
+/// # Errors
+/// Unreadable sheets or checkpoint, files that cannot be written, a loss that is not finite.
+pub fn run(
+    options: &TrainOptions,
+    progress: &mut dyn FnMut(&Progress),
+) -> Result<Summary, TrainError> {
+    // A network that sees the given frame learns which way is up; in the canonical one the turning is undone anyway.
+    let turning = match options.network.frame {
+        FrameKind::Given => Turning::Upright,
+        FrameKind::Canonical => Turning::Any,
+    };
+    let train = sampler(&options.sheets, turning)?;
+    let held = sampler(&options.held_out, turning)?;
+    let mut rng = ChaCha8Rng::seed_from_u64(HELD_OUT_SEED);
+    let held_out = (0..HELD_OUT_SAMPLES).map(|_| held(&mut rng)).collect();
+    let data_seed = scarffolds::sheets::read_manifest(&options.sheets)
+        .ok()
+        .map(|manifest| manifest.seed);
+    let sources = Sources {
+        train,
+        held_out,
+        data_seed,
+    };
+    trainer::train::<Autodiff<Flex>>(options, sources, progress)
+}
+
+type Source = Arc<dyn Fn(&mut ChaCha8Rng) -> Sample + Send + Sync>;
+
+fn sampler(dir: &Path, turning: Turning) -> Result<Source, TrainError> {
+    let refuse = |reason: String| TrainError::Sheets {
+        path: dir.to_owned(),
+        reason,
+    };
+    let sheets = scarffolds::sheets::read(dir).map_err(|e| refuse(e.to_string()))?;
+    if sheets.is_empty() {
+        return Err(refuse("there are none".into()));
+    }
+    let sampler = Sampler::new(&sheets, turning);
+    Ok(Arc::new(move |rng| sampler.sample(rng)))
+}

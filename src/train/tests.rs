@@ -1,0 +1,270 @@
+//! Laws of training, on small cylinders: hand-computed losses, repeatable batches, a state that survives its file, a loss that falls.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use burn::backend::{Autodiff, Flex};
+use burn::tensor::{Tensor, TensorData};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::batch::{Ahead, Batch, Recipe, augment, prepare};
+use super::loss::{Target, loss};
+use super::score::score;
+use super::*;
+use crate::grid::{CELLS, SIDE, cell_centre, cell_index};
+use crate::net::weights::export;
+use crate::net::{InputKind, Network};
+
+type B = Autodiff<Flex>;
+
+/// A cylinder of random radius with a square hole.
+fn cylinder(rng: &mut ChaCha8Rng) -> Sample {
+    let bend = rng.random_range(1.0..5.0f64);
+    let size = rng.random_range(4..12usize);
+    let truth = (0..CELLS)
+        .map(|k| {
+            let uv = cell_centre(k);
+            let angle = (uv.x - 0.3) * bend;
+            [angle.sin() / bend, uv.y, angle.cos() / bend].map(|x| 3.0 * x as f32)
+        })
+        .collect();
+    let hole: Vec<bool> = (0..CELLS)
+        .map(|k| (k % SIDE).abs_diff(30) < size && (k / SIDE).abs_diff(34) < size)
+        .collect();
+    Sample {
+        truth,
+        valid: vec![true; CELLS],
+        known: hole.iter().map(|h| !h).collect(),
+        hole,
+    }
+}
+
+fn options(out: &Path) -> TrainOptions {
+    TrainOptions {
+        out: out.to_owned(),
+        network: UnetConfig {
+            width: 2,
+            ..UnetConfig::default()
+        },
+        batch: 2,
+        minutes: 0.05,
+        every: 0.02,
+        ..TrainOptions::default()
+    }
+}
+
+fn sources() -> Sources {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    Sources {
+        train: Arc::new(cylinder),
+        held_out: (0..3).map(|_| cylinder(&mut rng)).collect(),
+        data_seed: Some(11),
+    }
+}
+
+/// A batch of one flat sheet, all of it known but the given cells.
+fn flat(hole: &[usize]) -> Batch {
+    let truth = (0..CELLS)
+        .map(|k| [cell_centre(k).x as f32, cell_centre(k).y as f32, 0.0])
+        .collect();
+    let hole: Vec<bool> = (0..CELLS).map(|k| hole.contains(&k)).collect();
+    let sample = Sample {
+        truth,
+        valid: vec![true; CELLS],
+        known: hole.iter().map(|h| !h).collect(),
+        hole,
+    };
+    Batch::of(&[prepare(&sample, FrameKind::Given).unwrap()])
+}
+
+#[test]
+fn the_loss_is_what_one_computes_by_hand() {
+    let cell = cell_index(20, 30);
+    let batch = flat(&[cell]);
+    let device = Default::default();
+    let mut answer = batch.truth.clone();
+    // The one hole cell is off by 2 cells along z; everything else is right.
+    answer[2 * CELLS + cell] += 2.0 / SIDE as f32;
+    let weight = f64::from(batch.weight.iter().sum::<f32>());
+    let predicted =
+        Tensor::<Flex, 4>::from_data(TensorData::new(answer, [1, 3, SIDE, SIDE]), &device);
+    let terms = loss(
+        predicted,
+        &Target::of(batch, &device),
+        &LossWeights {
+            gradient: 2.0,
+            stretch: 3.0,
+        },
+    );
+    let number = |x: Tensor<Flex, 1>| f64::from(x.into_scalar());
+    let (data, gradient, stretch) = (
+        number(terms.data),
+        number(terms.gradient),
+        number(terms.stretch),
+    );
+    assert!((data - (5f64.sqrt() - 1.0) / weight).abs() < 1e-6, "{data}");
+    // Two pairs along u and two along v touch the hole, each with a difference that is off by 2 cells: √(4 + ¼²) − ¼.
+    assert!(
+        (gradient - ((4.0 + 0.0625f64).sqrt() - 0.25)).abs() < 1e-3,
+        "{gradient}"
+    );
+    // Each is √5 cells long instead of 1.
+    assert!(
+        (stretch - (5f64.sqrt() - 1.0).powi(2)).abs() < 1e-3,
+        "{stretch}"
+    );
+    assert!((number(terms.total) - (data + 2.0 * gradient + 3.0 * stretch)).abs() < 1e-4);
+}
+
+#[test]
+fn the_truth_has_no_loss_and_perfect_scores() {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let sample = prepare(&cylinder(&mut rng), FrameKind::Canonical).unwrap();
+    let batch = Batch::of(std::slice::from_ref(&sample));
+    let device = Default::default();
+    let truth = Tensor::<Flex, 4>::from_data(
+        TensorData::new(batch.truth.clone(), [1, 3, SIDE, SIDE]),
+        &device,
+    );
+    let total = loss(truth, &Target::of(batch, &device), &LossWeights::default())
+        .total
+        .into_scalar();
+    assert!(total.abs() < 1e-5, "{total}");
+    let perfect = score(
+        std::slice::from_ref(&sample),
+        std::slice::from_ref(&sample.truth),
+    );
+    assert!(
+        perfect.rmse == 0.0
+            && perfect.normal < 1e-3
+            && perfect.spacing == 1.0
+            && perfect.area == 1.0,
+        "{perfect:?}"
+    );
+}
+
+#[test]
+fn prepared_samples_are_in_the_networks_units() {
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    for _ in 0..20 {
+        let sample = cylinder(&mut rng);
+        let Some(prepared) = augment(&sample, FrameKind::Canonical, &mut rng) else {
+            continue;
+        };
+        let known = || (0..CELLS).filter(|k| prepared.known[*k]);
+        let mean: f32 = known()
+            .map(|k| prepared.truth[k][0] + prepared.truth[k][1] + prepared.truth[k][2])
+            .sum::<f32>()
+            / known().count() as f32;
+        assert!(mean.abs() < 1e-4);
+        assert!(
+            (0..CELLS).all(|k| (prepared.input.known[k] > 0.0) == prepared.known[k]
+                && !(prepared.known[k] && prepared.hole[k]))
+        );
+        // The canonical frame lays u along x and v along y.
+        let slope =
+            |a: usize, b: usize, axis: usize| prepared.truth[b][axis] - prepared.truth[a][axis];
+        let along: f32 = (0..CELLS)
+            .filter(|k| k % SIDE + 1 < SIDE)
+            .map(|k| slope(k, k + 1, 0))
+            .sum();
+        let across: f32 = (0..CELLS - SIDE).map(|k| slope(k, k + SIDE, 1)).sum();
+        assert!(along > 0.0 && across > 0.0);
+    }
+}
+
+#[test]
+fn batches_depend_on_seed_and_index_alone() {
+    let recipe = Recipe {
+        source: Arc::new(cylinder),
+        frame: FrameKind::Canonical,
+        size: 2,
+        seed: 3,
+    };
+    let expected: Vec<Vec<f32>> = (4..8).map(|k| recipe.batch(k).positions).collect();
+    for threads in [1, 3] {
+        let mut ahead = Ahead::start(&recipe, 4, threads);
+        for positions in &expected {
+            assert_eq!(ahead.next_batch().unwrap().positions, *positions);
+        }
+    }
+    assert_ne!(expected[0], expected[1]);
+}
+
+#[test]
+fn training_learns_resumes_and_ships_what_loads() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut options = options(dir.path());
+    let mut losses = Vec::new();
+    let summary =
+        trainer::train::<B>(&options, sources(), &mut |p| losses.push(p.loss[0])).unwrap();
+    assert!(summary.steps > 0 && summary.weights.exists());
+    let network = Network::load(
+        &std::fs::read(&summary.weights).unwrap(),
+        Default::default(),
+    )
+    .unwrap();
+    let training = &network.card().training;
+    assert_eq!(
+        (training.steps, training.data_seed),
+        (summary.steps, Some(11))
+    );
+    assert!(network.card().scores["fill_rmse_cells"] > 0.0);
+
+    let state = checkpoint::load::<B>(&options, dir.path(), &Default::default()).unwrap();
+    assert_eq!(state.optimiser.step, summary.steps);
+    assert_eq!(
+        state.optimiser.moments.len(),
+        export(&state.averaged)
+            .keys()
+            .filter(|name| !name.ends_with(".mean") && !name.ends_with(".variance"))
+            .count()
+    );
+    let copy = tempfile::tempdir().unwrap();
+    checkpoint::save(&state, &options, copy.path()).unwrap();
+    let read = |dir: &Path| std::fs::read(dir.join("checkpoint.safetensors")).unwrap();
+    assert!(
+        read(dir.path()) == read(copy.path()),
+        "a checkpoint that is read and written again is the same"
+    );
+
+    options.resume = Start::Resume;
+    options.minutes = 0.08;
+    let further = trainer::train::<B>(&options, sources(), &mut |_| {}).unwrap();
+    assert!(further.steps > summary.steps);
+    options.seed = 99;
+    assert!(matches!(
+        trainer::train::<B>(&options, sources(), &mut |_| {}),
+        Err(TrainError::Checkpoint { .. })
+    ));
+}
+
+#[test]
+fn bad_options_are_refused_before_work() {
+    let dir = tempfile::tempdir().unwrap();
+    for bad in [
+        TrainOptions {
+            batch: 0,
+            ..options(dir.path())
+        },
+        TrainOptions {
+            minutes: f64::NAN,
+            ..options(dir.path())
+        },
+    ] {
+        assert!(matches!(
+            trainer::train::<B>(&bad, sources(), &mut |_| {}),
+            Err(TrainError::Options(_))
+        ));
+    }
+    let zeros = TrainOptions {
+        network: UnetConfig {
+            width: 2,
+            input: InputKind::Zeros,
+            frame: FrameKind::Given,
+        },
+        ..options(dir.path())
+    };
+    trainer::train::<B>(&zeros, sources(), &mut |_| {}).unwrap();
+}

@@ -1,0 +1,421 @@
+//! The training loop: warm-up and cosine over a budget of minutes, averaged weights, scores and checkpoints on the way.
+
+use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use burn::module::AutodiffModule;
+use burn::optim::GradientsParams;
+use burn::tensor::backend::{AutodiffBackend, Backend};
+use burn::tensor::{Tensor, TensorData};
+use rand_chacha::ChaCha8Rng;
+
+use super::batch::{Ahead, Batch, Prepared, Recipe, prepare};
+use super::checkpoint::{self, State, replace};
+use super::loss::{Loss, Target, loss};
+use super::optimiser::{AdamW, average};
+use super::score::{Score, score};
+use super::{Sample, Start, TrainError, TrainOptions};
+use crate::grid::{CELLS, SIDE};
+use crate::net::weights::{self, export};
+use crate::net::{Convolve, InputKind, TrainingCard, Unet, WeightsCard, cells, membrane};
+
+/// Steps over which the learning rate rises.
+const WARM_UP: u64 = 100;
+/// The learning rate's last value ÷ its highest.
+const LAST_RATE: f64 = 0.01;
+
+/// Where samples come from.
+pub struct Sources {
+    /// Draws a sample to learn from.
+    pub train: Arc<dyn Fn(&mut ChaCha8Rng) -> Sample + Send + Sync>,
+    /// Samples to be measured on.
+    pub held_out: Vec<Sample>,
+    /// Seed of the sheets behind `train`, for the model card.
+    pub data_seed: Option<u64>,
+}
+
+/// What a step tells its listener.
+#[derive(Debug, Clone, Copy)]
+pub struct Progress {
+    /// Steps done.
+    pub step: u64,
+    /// Minutes trained, all sittings together.
+    pub minutes: f64,
+    /// Share of the budget used, 0 to 1.
+    pub share: f64,
+    /// The loss, and its terms: data, gradient, stretch.
+    pub loss: [f32; 4],
+    /// Norm of the whole gradient.
+    pub norm: f64,
+    /// The newest scores, at the steps that measured them: the network's, and the input fill's on the same samples.
+    pub scores: Option<[Score; 2]>,
+}
+
+/// How a run ended.
+#[derive(Debug, Clone)]
+pub struct Summary {
+    /// Steps done.
+    pub steps: u64,
+    /// Minutes trained.
+    pub minutes: f64,
+    /// The network's last scores.
+    pub score: Score,
+    /// The input fill's scores on the same samples.
+    pub fill: Score,
+    /// The weights file.
+    pub weights: PathBuf,
+}
+
+/// Trains a network; see [`super::run`].
+pub fn train<B>(
+    options: &TrainOptions,
+    sources: Sources,
+    progress: &mut dyn FnMut(&Progress),
+) -> Result<Summary, TrainError>
+where
+    B: AutodiffBackend<InnerBackend: Convolve> + Convolve,
+{
+    check(options)?;
+    let device = B::Device::default();
+    std::fs::create_dir_all(&options.out).map_err(|source| TrainError::File {
+        path: options.out.clone(),
+        source,
+    })?;
+    let mut state: State<B> = match options.resume {
+        Start::Fresh => fresh(options, &device),
+        Start::Resume => checkpoint::load(options, &options.out, &device)?,
+    };
+    let held_out: Vec<Prepared> = sources
+        .held_out
+        .iter()
+        .filter_map(|s| prepare(s, options.network.frame))
+        .collect();
+    let fill = score(&held_out, &input_fill::<B::InnerBackend>(&held_out));
+    let recipe = Recipe {
+        source: sources.train,
+        frame: options.network.frame,
+        size: options.batch,
+        seed: options.seed,
+    };
+    let mut batches = Ahead::start(&recipe, state.optimiser.step, options.sample_threads);
+    let mut curves = Curves::open(&options.out, options.resume)?;
+    let (started, before) = (Instant::now(), state.seconds);
+    let mut next_export = before + options.every * 60.0;
+    let budget = options.minutes * 60.0;
+    loop {
+        let batch = batches.next_batch().ok_or(TrainError::NoSamples)?;
+        let share = (state.seconds / budget).min(1.0);
+        let rate = rate(options.rate, share, state.optimiser.step);
+        let (terms, norm) = step(&mut state, batch, options, rate);
+        if !terms[0].is_finite() || !norm.is_finite() {
+            return Err(TrainError::Diverged {
+                step: state.optimiser.step,
+            });
+        }
+        state.seconds = before + started.elapsed().as_secs_f64();
+        let last = state.seconds >= budget;
+        let mut report = Progress {
+            step: state.optimiser.step,
+            minutes: state.seconds / 60.0,
+            share,
+            loss: terms,
+            norm,
+            scores: None,
+        };
+        curves.step(&report, rate)?;
+        if last || state.seconds >= next_export {
+            next_export = state.seconds + options.every * 60.0;
+            let scored = score(
+                &held_out,
+                &predictions(&state.averaged, options.network.input, &held_out),
+            );
+            report.scores = Some([scored, fill]);
+            curves.scores(&report)?;
+            let path = write_weights(&state, options, &[scored, fill], sources.data_seed)?;
+            checkpoint::save(&state, options, &options.out)?;
+            if last {
+                progress(&report);
+                return Ok(Summary {
+                    steps: report.step,
+                    minutes: report.minutes,
+                    score: scored,
+                    fill,
+                    weights: path,
+                });
+            }
+        }
+        progress(&report);
+    }
+}
+
+fn check(options: &TrainOptions) -> Result<(), TrainError> {
+    let positive = |x: f64| x.is_finite() && x > 0.0;
+    if options.batch == 0 || !(1..=256).contains(&options.network.width) {
+        return Err(TrainError::Options(
+            "batch must be at least 1 and width in 1..=256".into(),
+        ));
+    }
+    if !positive(options.minutes) || !positive(options.every) || !positive(options.rate) {
+        return Err(TrainError::Options(
+            "minutes, interval and learning rate must be positive".into(),
+        ));
+    }
+    Ok(())
+}
+
+fn fresh<B>(options: &TrainOptions, device: &B::Device) -> State<B>
+where
+    B: AutodiffBackend<InnerBackend: Convolve> + Convolve,
+{
+    B::seed(device, options.seed);
+    let network = options.network.init::<B>(device);
+    let averaged = network.valid();
+    State {
+        network,
+        averaged,
+        optimiser: AdamW::default(),
+        seconds: 0.0,
+    }
+}
+
+/// Learning rate at a share of the budget: a linear rise over the first steps, then half a cosine.
+fn rate(highest: f64, share: f64, step: u64) -> f64 {
+    let rise = ((step + 1) as f64 / WARM_UP as f64).min(1.0);
+    let fall = LAST_RATE + (1.0 - LAST_RATE) * 0.5 * (1.0 + (std::f64::consts::PI * share).cos());
+    highest * rise * fall
+}
+
+/// One step; returns the loss with its terms, and the gradient's norm.
+fn step<B>(state: &mut State<B>, batch: Batch, options: &TrainOptions, rate: f64) -> ([f32; 4], f64)
+where
+    B: AutodiffBackend<InnerBackend: Convolve> + Convolve,
+{
+    let device = B::Device::default();
+    let (positions, known) = inputs::<B::InnerBackend>(&batch);
+    // The fill does not depend on the weights: it is computed outside the graph.
+    let filled = match options.network.input {
+        InputKind::Zeros => positions,
+        InputKind::Membrane => membrane(positions, known.clone()),
+    };
+    let (filled, known) = (
+        Tensor::<B, 4>::from_inner(filled),
+        Tensor::from_inner(known),
+    );
+    let predicted = match options.network.input {
+        InputKind::Zeros => state.network.predict(InputKind::Zeros, filled, known),
+        InputKind::Membrane => state.network.residual(filled.clone(), known) + filled,
+    };
+    let target = Target::of(batch, &device);
+    let Loss {
+        total,
+        data,
+        gradient,
+        stretch,
+    } = loss(predicted, &target, &options.loss);
+    let terms = [&total, &data, &gradient, &stretch].map(number);
+    let gradients = GradientsParams::from_grads(total.backward(), &state.network);
+    let (network, norm) = state
+        .optimiser
+        .step::<B, _>(state.network.clone(), gradients, rate);
+    state.network = network;
+    state.averaged = average(
+        state.averaged.clone(),
+        &state.network.valid(),
+        state.optimiser.step,
+    );
+    (terms, norm)
+}
+
+fn number<B: Backend>(x: &Tensor<B, 1>) -> f32 {
+    x.to_data()
+        .convert::<f32>()
+        .iter::<f32>()
+        .next()
+        .unwrap_or(f32::NAN)
+}
+
+/// Positions `[count, 3, 64, 64]` and known flags `[count, 1, 64, 64]` of a batch.
+fn inputs<B: Backend>(batch: &Batch) -> (Tensor<B, 4>, Tensor<B, 4>) {
+    let device = B::Device::default();
+    let tensor = |values: &[f32], channels: usize| {
+        Tensor::from_data(
+            TensorData::new(values.to_vec(), [batch.count, channels, SIDE, SIDE]),
+            &device,
+        )
+    };
+    (tensor(&batch.positions, 3), tensor(&batch.known, 1))
+}
+
+/// The network's answer for prepared samples, in their own frame.
+fn predictions<B: Convolve>(
+    network: &Unet<B>,
+    input: InputKind,
+    samples: &[Prepared],
+) -> Vec<Vec<[f32; 3]>> {
+    answers(samples, |positions, known| {
+        network.predict(input, positions, known)
+    })
+}
+
+/// The membrane alone, for comparison.
+fn input_fill<B: Backend>(samples: &[Prepared]) -> Vec<Vec<[f32; 3]>> {
+    answers(samples, membrane::<B>)
+}
+
+fn answers<B: Backend>(
+    samples: &[Prepared],
+    answer: impl Fn(Tensor<B, 4>, Tensor<B, 4>) -> Tensor<B, 4>,
+) -> Vec<Vec<[f32; 3]>> {
+    let chunks = samples.chunks(8).flat_map(|chunk| {
+        let (positions, known) = inputs::<B>(&Batch::of(chunk));
+        let planes: Vec<f32> = answer(positions, known)
+            .into_data()
+            .convert::<f32>()
+            .into_vec()
+            .unwrap_or_default();
+        planes
+            .chunks_exact(3 * CELLS)
+            .map(cells)
+            .collect::<Vec<_>>()
+    });
+    chunks.collect()
+}
+
+/// Writes the averaged weights: the newest under the run's name, and a copy that is kept.
+fn write_weights<B: AutodiffBackend>(
+    state: &State<B>,
+    options: &TrainOptions,
+    [scored, fill]: &[Score; 2],
+    data_seed: Option<u64>,
+) -> Result<PathBuf, TrainError> {
+    let steps = state.optimiser.step;
+    let card = WeightsCard {
+        name: options.name.clone(),
+        sha256: String::new(),
+        architecture: options.network,
+        training: TrainingCard {
+            steps,
+            batch: options.batch,
+            seed: options.seed,
+            samples: steps * options.batch as u64,
+            minutes: state.seconds / 60.0,
+            data_seed,
+            loss: format!(
+                "data + {} gradient + {} stretch",
+                options.loss.gradient, options.loss.stretch
+            ),
+        },
+        scores: named_scores(scored, fill),
+        darn_version: env!("CARGO_PKG_VERSION").to_owned(),
+    };
+    let bytes = weights::write(&export(&state.averaged), &card)?;
+    let newest = options.out.join(format!("{}.safetensors", options.name));
+    replace(&newest, &bytes)?;
+    replace(
+        &options.out.join(format!(
+            "{}-{:04.0}min.safetensors",
+            options.name,
+            state.seconds / 60.0
+        )),
+        &bytes,
+    )?;
+    Ok(newest)
+}
+
+/// Scores by name, as the card carries them: the network's, and with `fill_` before the name the input fill's.
+fn named_scores(scored: &Score, fill: &Score) -> BTreeMap<String, f64> {
+    let named = |prefix: &str, s: &Score| {
+        [
+            ("rmse_cells", s.rmse),
+            ("rmse_median_cells", s.rmse_median),
+            ("normal_degrees", s.normal),
+            ("spacing_ratio", s.spacing),
+            ("area_ratio", s.area),
+        ]
+        .map(|(name, value)| (format!("{prefix}{name}"), value))
+    };
+    named("", scored)
+        .into_iter()
+        .chain(named("fill_", fill))
+        .collect()
+}
+
+/// The CSV curves of a run.
+struct Curves {
+    steps: File,
+    scores: File,
+    dir: PathBuf,
+}
+
+impl Curves {
+    fn open(dir: &Path, start: Start) -> Result<Curves, TrainError> {
+        let open = |name: &str, header: &str| {
+            let path = dir.join(name);
+            let mut options = OpenOptions::new();
+            let append = start == Start::Resume;
+            options
+                .create(true)
+                .write(true)
+                .append(append)
+                .truncate(!append);
+            let opened = options.open(&path).and_then(|mut file| {
+                if file.metadata()?.len() == 0 {
+                    writeln!(file, "{header}")?;
+                }
+                Ok(file)
+            });
+            opened.map_err(|source| TrainError::File { path, source })
+        };
+        let score = "rmse,rmse_median,normal,spacing,area";
+        let fill = score
+            .split(',')
+            .map(|name| format!("fill_{name}"))
+            .collect::<Vec<_>>()
+            .join(",");
+        Ok(Curves {
+            steps: open(
+                "loss.csv",
+                "step,minutes,rate,loss,data,gradient,stretch,norm",
+            )?,
+            scores: open("scores.csv", &format!("step,minutes,{score},{fill}"))?,
+            dir: dir.to_owned(),
+        })
+    }
+
+    fn step(&mut self, p: &Progress, rate: f64) -> Result<(), TrainError> {
+        let [total, data, gradient, stretch] = p.loss;
+        let line = writeln!(
+            self.steps,
+            "{},{:.3},{rate:.3e},{total:.4},{data:.4},{gradient:.4},{stretch:.4},{:.3}",
+            p.step, p.minutes, p.norm
+        );
+        line.map_err(|source| TrainError::File {
+            path: self.dir.join("loss.csv"),
+            source,
+        })
+    }
+
+    fn scores(&mut self, p: &Progress) -> Result<(), TrainError> {
+        let values = p
+            .scores
+            .iter()
+            .flatten()
+            .flat_map(|s| [s.rmse, s.rmse_median, s.normal, s.spacing, s.area]);
+        let values: Vec<String> = values.map(|v| format!("{v:.4}")).collect();
+        let line = writeln!(
+            self.scores,
+            "{},{:.3},{}",
+            p.step,
+            p.minutes,
+            values.join(",")
+        );
+        line.map_err(|source| TrainError::File {
+            path: self.dir.join("scores.csv"),
+            source,
+        })
+    }
+}
