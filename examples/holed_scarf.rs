@@ -13,15 +13,24 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut words = std::env::args().skip(1);
     let seed = words.next().map_or(Ok(7), |w| w.parse())?;
     let index = words.next().map_or(Ok(0), |w| w.parse())?;
-    let out = words.next().unwrap_or_else(|| "examples/scarf_hole.glb".to_owned());
+    let out = words
+        .next()
+        .unwrap_or_else(|| "examples/scarf_hole.glb".to_owned());
     let (sheet, _) = sheets::make(seed, index)?;
-    let hole = Hole::Blob { centre: Vec2::new(0.48, 0.53), radius: 0.17 };
+    let hole = Hole::Blob {
+        centre: Vec2::new(0.48, 0.53),
+        radius: 0.17,
+    };
     let cut = scanned(&sheet, 62, &hole, &mut ChaCha8Rng::seed_from_u64(seed));
     // The simulation's up is +z, glTF's is +y.
     let turn = |p: &darn::mesh::Vec3| [p.x as f32, p.z as f32, -p.y as f32];
     let positions: Vec<[f32; 3]> = cut.mesh.positions.iter().map(turn).collect();
     let normals: Vec<[f32; 3]> = vertex_normals(&cut.mesh).iter().map(turn).collect();
-    let texcoords: Vec<[f32; 2]> = cut.rest.iter().map(|p| [p.x as f32, 1.0 - p.y as f32]).collect();
+    let texcoords: Vec<[f32; 2]> = cut
+        .rest
+        .iter()
+        .map(|p| [p.x as f32, 1.0 - p.y as f32])
+        .collect();
     let bytes = glb(&Fresh {
         name: "scarf",
         positions: &positions,
@@ -30,6 +39,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         faces: &cut.mesh.faces,
     })?;
     std::fs::write(&out, &bytes)?;
-    println!("{out}: {} vertices, {} triangles, {} bytes", positions.len(), cut.mesh.faces.len(), bytes.len());
+    println!(
+        "{out}: {} vertices, {} triangles, {} bytes",
+        positions.len(),
+        cut.mesh.faces.len(),
+        bytes.len()
+    );
     Ok(())
 }

@@ -1,0 +1,109 @@
+//! A scan seen as cloth: welded, with its boundary loops, and how its triangles lead back to the scan's own.
+
+use std::time::Instant;
+
+use super::milliseconds;
+use crate::contract::v1;
+use crate::mesh::loops::{BoundaryLoop, LoopKind, boundary_loops};
+use crate::mesh::topology::Topology;
+use crate::mesh::weld::{Welded, weld};
+use crate::scan::Scan;
+
+/// The welded surface of a scan and its loops.
+pub struct Cloth {
+    /// Welded mesh; its faces lead back to the scan's by `face_of`.
+    pub welded: Welded,
+    /// Its topology.
+    pub topology: Topology,
+    /// Its boundary loops; a loop's id is its place here.
+    pub loops: Vec<BoundaryLoop>,
+    /// Milliseconds of welding and of finding loops.
+    pub timings: v1::ScanTimings,
+}
+
+impl Cloth {
+    /// Welds a scan and finds its loops.
+    pub fn of(scan: &Scan) -> Cloth {
+        let started = Instant::now();
+        let welded = weld(&scan.surface);
+        let weld = milliseconds(started);
+        let started = Instant::now();
+        let topology = Topology::new(&welded.mesh);
+        let loops = boundary_loops(&welded.mesh, &topology);
+        let timings = v1::ScanTimings {
+            weld,
+            loops: milliseconds(started),
+            ..Default::default()
+        };
+        Cloth {
+            welded,
+            topology,
+            loops,
+            timings,
+        }
+    }
+
+    /// The scan's part that a welded face belongs to, and its corners there.
+    pub fn source(&self, scan: &Scan, face: u32) -> Option<(usize, [u32; 3])> {
+        let own = *self.welded.face_of.get(face as usize)?;
+        Some((
+            scan.part_of_face(own)?,
+            *scan.surface.faces.get(own as usize)?,
+        ))
+    }
+
+    /// A loop as the API describes it.
+    pub fn described(&self, rim: &BoundaryLoop, scan: &Scan) -> v1::Loop {
+        let part = rim
+            .half_edges
+            .first()
+            .and_then(|h| self.source(scan, h / 3))
+            .map(|(part, _)| part);
+        v1::Loop {
+            id: rim.id,
+            kind: kind(rim.kind) as i32,
+            length: rim.length,
+            vertices: rim.vertices.len() as u32,
+            centroid: rim.centroid.iter().copied().collect(),
+            area: (rim.kind != LoopKind::TubeEnd).then_some(rim.area),
+            turning: rim.turning,
+            mesh: part
+                .and_then(|p| scan.mesh_name(p))
+                .unwrap_or_default()
+                .to_owned(),
+            component: rim.component,
+        }
+    }
+
+    /// What a person should know about the scan as a whole.
+    pub fn notes(&self, scan: &Scan) -> Vec<String> {
+        let mut notes = Vec::new();
+        if self.welded.dropped > 0 {
+            notes.push(format!(
+                "{} degenerate or duplicate triangle(s) were not looked at",
+                self.welded.dropped
+            ));
+        }
+        if !self.topology.non_manifold.is_empty() {
+            notes.push(format!(
+                "{} triangle side(s) lie on edges shared by more than two triangles",
+                self.topology.non_manifold.len()
+            ));
+        }
+        if scan.parts.iter().any(|p| p.shared) {
+            notes.push(
+                "a mesh is drawn by several nodes; a patch on it shows at each of them".to_owned(),
+            );
+        }
+        notes
+    }
+}
+
+/// A loop's kind in the contract's words.
+pub fn kind(kind: LoopKind) -> v1::LoopKind {
+    match kind {
+        LoopKind::Hole => v1::LoopKind::Hole,
+        LoopKind::Outer => v1::LoopKind::OuterBoundary,
+        LoopKind::TubeEnd => v1::LoopKind::TubeEnd,
+    }
+}

@@ -1,0 +1,177 @@
+//! A patch in the scan's own terms: which mesh takes it, which vertices it shares, its attributes and its provenance.
+
+use std::collections::BTreeMap;
+
+use serde_json::json;
+
+use super::cloth::Cloth;
+use super::{MendError, Mender, VERSION};
+use crate::contract::v1;
+use crate::flatten::Chart;
+use crate::mesh::Vec3;
+use crate::mesh::curvature::vertex_normals;
+use crate::mesh::region::Region;
+use crate::patch::attributes::{Columns, dress};
+use crate::patch::{Patch, quality};
+use crate::scan::{Addition, Part, PatchPoint, Scan};
+
+/// The patch as a primitive of the part that most of its rim belongs to.
+pub fn addition(
+    (scan, cloth): (&Scan, &Cloth),
+    (region, chart): (&Region, &Chart),
+    patch: &Patch,
+    report: &v1::HoleReport,
+    mender: &Mender,
+) -> Result<Addition, MendError> {
+    let sources: Vec<Option<(usize, [u32; 3])>> = region
+        .faces
+        .iter()
+        .map(|f| cloth.source(scan, *f))
+        .collect();
+    let part = majority(patch, region, &sources);
+    let look = &scan.parts[part];
+    let alike = |other: usize| {
+        let other: &Part = &scan.parts[other];
+        other.material == look.material
+            && other.texcoords.len() == look.texcoords.len()
+            && other.colors.len() == look.colors.len()
+    };
+    let corners: Vec<Option<[u32; 3]>> = sources
+        .iter()
+        .map(|s| s.filter(|(p, _)| alike(*p)).map(|(_, c)| c))
+        .collect();
+    let mut any = vec![0; region.mesh.positions.len()];
+    let mut part_of = BTreeMap::new();
+    for (face, source) in region.mesh.faces.iter().zip(&sources) {
+        let Some((p, scan_corners)) = source else {
+            continue;
+        };
+        for (v, s) in face.iter().zip(scan_corners) {
+            // A vertex of the patch's own node is preferred: its stored bits are copied.
+            let own = scan.parts[*p].node == look.node;
+            if own || part_of.is_empty() {
+                any[*v as usize] = *s;
+            }
+            if alike(*p) {
+                part_of.insert(*s, *p);
+            }
+        }
+    }
+    let values = |s: u32| {
+        part_of
+            .get(&s)
+            .map_or_else(Vec::new, |p| columns_of(&scan.parts[*p], s))
+    };
+    let width = 2 * look.texcoords.len() + 4 * look.colors.len();
+    let dressed = dress(
+        patch,
+        region,
+        chart,
+        &Columns {
+            corners: &corners,
+            any: &any,
+            values: &values,
+            width,
+        },
+    );
+
+    let normals = normals(patch, region);
+    let points = dressed.corners.iter().map(|c| match c.scan {
+        Some(s) => PatchPoint::Scan(s),
+        None => PatchPoint::New(patch.positions[c.vertex as usize]),
+    });
+    let column = |c: usize| {
+        dressed
+            .corners
+            .iter()
+            .map(move |corner| corner.values.get(c).copied().unwrap_or_default() as f32)
+    };
+    let texcoords = (0..look.texcoords.len()).map(|t| {
+        column(2 * t)
+            .zip(column(2 * t + 1))
+            .map(|(s, t)| [s, t])
+            .collect()
+    });
+    let first = 2 * look.texcoords.len();
+    let colors = (0..look.colors.len()).map(|c| {
+        let channel = |k: usize| {
+            column(first + 4 * c + k)
+                .map(|x| x.clamp(0.0, 1.0))
+                .collect::<Vec<f32>>()
+        };
+        let rgba = [channel(0), channel(1), channel(2), channel(3)];
+        (0..dressed.corners.len())
+            .map(|n| [0, 1, 2, 3].map(|k: usize| rgba[k][n]))
+            .collect()
+    });
+    Ok(Addition {
+        part,
+        material_of: part,
+        points: points.collect(),
+        faces: dressed.faces,
+        normals: dressed
+            .corners
+            .iter()
+            .map(|c| normals[c.vertex as usize])
+            .collect(),
+        texcoords: texcoords.collect(),
+        colors: colors.collect(),
+        name: format!("darn reconstruction of hole {}", report.id),
+        extras: provenance(report, mender),
+    })
+}
+
+/// The part that the largest number of rim edges belongs to; the first of them on a tie.
+fn majority(patch: &Patch, region: &Region, sources: &[Option<(usize, [u32; 3])>]) -> usize {
+    let mut on_rim = vec![false; region.mesh.positions.len()];
+    patch.rim.iter().for_each(|v| on_rim[*v as usize] = true);
+    let mut votes: BTreeMap<usize, usize> = BTreeMap::new();
+    for (face, source) in region.mesh.faces.iter().zip(sources) {
+        let touching = face.iter().filter(|v| on_rim[**v as usize]).count();
+        if let (2.., Some((part, _))) = (touching, source) {
+            *votes.entry(*part).or_default() += 1;
+        }
+    }
+    votes
+        .into_iter()
+        .max_by(|a, b| a.1.cmp(&b.1).then(b.0.cmp(&a.0)))
+        .map_or(0, |(part, _)| part)
+}
+
+/// Texture coordinates, then colours, of a scan vertex.
+fn columns_of(part: &Part, vertex: u32) -> Vec<f64> {
+    let at = (vertex - part.vertices.start) as usize;
+    let texcoords = part.texcoords.iter().flat_map(|set| set[at]);
+    let colors = part.colors.iter().flat_map(|set| set[at]);
+    texcoords.chain(colors).map(f64::from).collect()
+}
+
+/// Normals of the patch's vertices with the scan's triangles around taken into account, so that the light does not break at the seam.
+fn normals(patch: &Patch, region: &Region) -> Vec<Vec3> {
+    let all = vertex_normals(&quality::joined(patch, region));
+    let inner = region.mesh.positions.len();
+    let rim = patch.rim.iter().map(|v| all[*v as usize]);
+    let solid = |n: Vec3| if n.norm() > 0.0 { n } else { Vec3::z() };
+    rim.chain(all[inner..].iter().copied()).map(solid).collect()
+}
+
+/// What `extras.darn` says of a patch: that it is reconstructed, by what, and with which numbers. No timings: same input, same bytes.
+fn provenance(report: &v1::HoleReport, mender: &Mender) -> serde_json::Value {
+    let card = mender.network.card();
+    let patch = report.patch.unwrap_or_default();
+    let chart = report.chart.unwrap_or_default();
+    json!({
+        "reconstructed": true,
+        "hole": report.id,
+        "version": VERSION,
+        "weights": { "name": card.name, "sha256": card.sha256 },
+        "chart": { "stretchMean": chart.stretch_mean, "stretchMax": chart.stretch_max },
+        "patch": {
+            "area": patch.area,
+            "stretchMean": patch.stretch_mean,
+            "stretchMax": patch.stretch_max,
+            "gaussianCurvature": patch.gaussian_curvature,
+            "selfIntersections": patch.self_intersections,
+        },
+    })
+}

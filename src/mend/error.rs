@@ -1,0 +1,103 @@
+//! Why a scan could not be mended, and the stable word programs know each reason by.
+
+use crate::contract::FieldError;
+use crate::flatten::FlattenError;
+use crate::mesh::region::RegionError;
+use crate::net::NetError;
+use crate::patch::PatchError;
+use crate::scan::ScanError;
+
+/// Why a scan could not be mended.
+#[derive(Debug, thiserror::Error)]
+pub enum MendError {
+    /// Constraints that do not fit this scan.
+    #[error("{} constraint(s) do not fit this scan: {}", .0.len(), told(.0))]
+    Constraints(Vec<FieldError>),
+    /// The hole's rim runs through an edge that more than two triangles share.
+    #[error("hole {hole} runs through non-manifold edges; its rim is not a single closed line")]
+    NonManifold {
+        /// Id of the hole's loop.
+        hole: u32,
+    },
+    /// No disk of cloth around the hole.
+    #[error("hole {hole}: {source}")]
+    Region {
+        /// Id of the hole's loop.
+        hole: u32,
+        /// Why.
+        source: RegionError,
+    },
+    /// The cloth around the hole does not lie flat.
+    #[error("hole {hole}: {source}")]
+    Flatten {
+        /// Id of the hole's loop.
+        hole: u32,
+        /// Why.
+        source: FlattenError,
+    },
+    /// The cloth around the hole covers no two neighbouring cells of the grid.
+    #[error(
+        "hole {hole}: the cloth around it covers {known} of the grid's cells; too little is known to go on from"
+    )]
+    TooLittleKnown {
+        /// Id of the hole's loop.
+        hole: u32,
+        /// Cells the cloth covers.
+        known: usize,
+    },
+    /// The hole could not be meshed.
+    #[error("hole {hole}: {source}")]
+    Patch {
+        /// Id of the hole's loop.
+        hole: u32,
+        /// Why.
+        source: PatchError,
+    },
+    /// The network failed.
+    #[error("the network failed: {0}")]
+    Net(#[from] NetError),
+    /// The patches could not be written.
+    #[error("the patches could not be written: {0}")]
+    Scan(#[from] ScanError),
+}
+
+impl MendError {
+    /// The stable word for programs.
+    pub fn code(&self) -> &'static str {
+        match self {
+            MendError::Constraints(_) => "constraints_do_not_fit",
+            MendError::NonManifold { .. } => "non_manifold_rim",
+            MendError::Region { .. } => "not_a_disk",
+            MendError::Flatten { .. } => "not_cloth_like",
+            MendError::TooLittleKnown { .. } => "too_little_known",
+            MendError::Patch {
+                source: PatchError::RimCrosses,
+                ..
+            } => "rim_crosses_itself",
+            MendError::Patch { .. } => "patch_degenerate",
+            MendError::Scan(ScanError::Singular { .. }) => "singular_transform",
+            MendError::Net(_) | MendError::Scan(_) => "internal",
+        }
+    }
+
+    /// Whether it is our own fault and no business of the caller's.
+    pub fn is_internal(&self) -> bool {
+        self.code() == "internal"
+    }
+
+    /// The constraints it is about.
+    pub fn fields(&self) -> Vec<FieldError> {
+        match self {
+            MendError::Constraints(fields) => fields.clone(),
+            _ => Vec::new(),
+        }
+    }
+}
+
+fn told(fields: &[FieldError]) -> String {
+    let each: Vec<String> = fields
+        .iter()
+        .map(|f| format!("{}: {}", f.pointer, f.detail))
+        .collect();
+    each.join("; ")
+}

@@ -1,0 +1,286 @@
+//! One hole from rim to patch: region, chart, grid, network, mesh, and the numbers of each.
+
+use std::time::Instant;
+
+use super::cloth::{Cloth, kind};
+use super::select::Chosen;
+use super::{MendError, Mender, dress, milliseconds};
+use crate::contract::{Anchor, FieldError, v1};
+use crate::flatten::{self, Chart};
+use crate::grid::{self, Grid, Normalisation};
+use crate::mesh::region::{self, Region};
+use crate::mesh::{Vec2, Vec3};
+use crate::patch::{self, Patch, PatchError, quality};
+use crate::scan::{Addition, Scan};
+
+/// How much of the grid's side the hole should take, so that hole and context share it as in training.
+const SHARE: f64 = 0.5;
+/// A region is grown again when its reach is off by more than this factor.
+const OFF: f64 = 1.3;
+/// Reach of each further try, when a region gives no usable chart.
+const SMALLER: f64 = 0.6;
+/// Tries with smaller and smaller regions.
+const TRIES: usize = 4;
+
+/// Mends one hole.
+pub fn mend(
+    scan: &Scan,
+    cloth: &Cloth,
+    chosen: &Chosen,
+    mender: &Mender,
+) -> Result<(Addition, v1::HoleReport), MendError> {
+    let rim = &cloth.loops[chosen.id as usize];
+    // The reach that suits a round hole of this rim length; a ragged one is set right after the first chart.
+    let mut reach = reach_for(rim.length / std::f64::consts::PI);
+    let mut tries = 0;
+    let (laid, patch, grid) = loop {
+        let outcome = Laid::out(cloth, chosen.id, reach, mender).and_then(|laid| {
+            let (patch, grid) = laid.filled(chosen, mender)?;
+            Ok((laid, patch, grid))
+        });
+        tries += 1;
+        match outcome {
+            Err(error) if tries < TRIES && may_shrink(&error) => reach *= SMALLER,
+            outcome => break outcome?,
+        }
+    };
+    let started = Instant::now();
+    let quality = quality::measure(&patch, &laid.region);
+    let mut timings = v1::HoleTimings {
+        net: grid.net_ms,
+        patch: grid.patch_ms,
+        raster: grid.raster_ms,
+        ..laid.timings
+    };
+    timings.report = milliseconds(started);
+    let report = v1::HoleReport {
+        id: chosen.id,
+        kind: kind(rim.kind) as i32,
+        length: rim.length,
+        vertices: rim.vertices.len() as u32,
+        chart: Some(v1::ChartReport {
+            faces: laid.region.faces.len() as u32,
+            stretch_mean: laid.chart.stretch_mean,
+            stretch_max: laid.chart.stretch_max,
+            flips: laid.chart.flipped as u32,
+            iterations: laid.chart.rounds as u32,
+        }),
+        grid: Some(grid.report),
+        patch: Some(v1::PatchReport {
+            vertices: patch.positions.len() as u32,
+            faces: patch.faces.len() as u32,
+            area: quality.area,
+            stretch_mean: quality.stretch_mean,
+            stretch_max: quality.stretch_max,
+            gaussian_curvature: quality.gaussian_curvature,
+            seam_gap: quality.seam_gap,
+            self_intersections: quality.self_intersections as u32,
+            strain_iterations: patch.strain_rounds as u32,
+        }),
+        anchors: chosen
+            .anchors
+            .iter()
+            .map(|(_, a)| kept(&patch, &laid.chart, a))
+            .collect(),
+        timings: Some(timings),
+        notes: laid.notes(),
+    };
+    let addition = dress::addition(
+        (scan, cloth),
+        (&laid.region, &laid.chart),
+        &patch,
+        &report,
+        mender,
+    )?;
+    Ok((addition, report))
+}
+
+/// Cloth around a hole, laid flat.
+struct Laid {
+    region: Region,
+    chart: Chart,
+    timings: v1::HoleTimings,
+}
+
+/// What the grid stage measured.
+struct GridOutcome {
+    report: v1::GridReport,
+    raster_ms: f64,
+    net_ms: f64,
+    patch_ms: f64,
+}
+
+impl Laid {
+    /// Grows and flattens the region; once more when the chart shows that the reach did not suit the hole.
+    fn out(cloth: &Cloth, hole: u32, reach: f64, mender: &Mender) -> Result<Laid, MendError> {
+        let laid = Self::with_reach(cloth, hole, reach, mender)?;
+        let wanted = reach_for(laid.hole_extent());
+        // Only outwards if the region stopped because it was asked to, not because the cloth ended or wraps around.
+        let off = wanted < reach / OFF || (wanted > reach * OFF && laid.region.reach >= reach);
+        if !off {
+            return Ok(laid);
+        }
+        let mut again = match Self::with_reach(cloth, hole, wanted, mender) {
+            Ok(again) => again,
+            Err(_) => return Ok(laid),
+        };
+        again.timings.region += laid.timings.region;
+        again.timings.flatten += laid.timings.flatten;
+        Ok(again)
+    }
+
+    fn with_reach(
+        cloth: &Cloth,
+        hole: u32,
+        reach: f64,
+        mender: &Mender,
+    ) -> Result<Laid, MendError> {
+        let started = Instant::now();
+        let region = region::grow(
+            &cloth.welded.mesh,
+            &cloth.topology,
+            &cloth.loops,
+            hole as usize,
+            reach,
+        )
+        .map_err(|source| MendError::Region { hole, source })?;
+        let grown = milliseconds(started);
+        let started = Instant::now();
+        let chart = flatten::flatten(&region, &mender.limits.flatten)
+            .map_err(|source| MendError::Flatten { hole, source })?;
+        let timings = v1::HoleTimings {
+            region: grown,
+            flatten: milliseconds(started),
+            ..Default::default()
+        };
+        Ok(Laid {
+            region,
+            chart,
+            timings,
+        })
+    }
+
+    /// Larger side of the hole's box in the chart, scene units.
+    fn hole_extent(&self) -> f64 {
+        let uvs = self.region.rim.iter().map(|v| self.chart.uv(*v));
+        let (low, high) = uvs.fold(
+            (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY)),
+            |(low, high), uv| (low.inf(&uv), high.sup(&uv)),
+        );
+        (high - low).max() * self.chart.frame.side
+    }
+
+    /// Samples the grid, sets the anchors, asks the network and meshes the answer.
+    fn filled(&self, chosen: &Chosen, mender: &Mender) -> Result<(Patch, GridOutcome), MendError> {
+        let started = Instant::now();
+        let mut grid = flatten::raster(&self.region.mesh, &self.chart);
+        let raster_ms = milliseconds(started);
+        let too_little = MendError::TooLittleKnown {
+            hole: chosen.id,
+            known: grid.known_count(),
+        };
+        let normal = grid.normalisation().ok_or(too_little)?;
+        let report = self.grid_report(&grid, &normal);
+        self.anchor(&mut grid, &chosen.anchors)?;
+
+        let started = Instant::now();
+        let predicted = mender
+            .network
+            .fill(std::slice::from_ref(&grid.normalised(&normal)))?;
+        let net_ms = milliseconds(started);
+
+        let started = Instant::now();
+        let filled = grid.filled(predicted.first().map_or(&[], Vec::as_slice), &normal);
+        let patch = patch::build(&self.region, &self.chart, &filled, &mender.limits.patch)
+            .map_err(|source| MendError::Patch {
+                hole: chosen.id,
+                source,
+            })?;
+        Ok((
+            patch,
+            GridOutcome {
+                report,
+                raster_ms,
+                net_ms,
+                patch_ms: milliseconds(started),
+            },
+        ))
+    }
+
+    /// Sets each anchor's cell to its position and marks it known (soft: the network may not reach it).
+    fn anchor(&self, grid: &mut Grid, anchors: &[(usize, Anchor)]) -> Result<(), MendError> {
+        let polygon: Vec<Vec2> = self.region.rim.iter().map(|v| self.chart.uv(*v)).collect();
+        let mut wrong = Vec::new();
+        for (i, anchor) in anchors {
+            let cell = grid::cell_at(anchor.uv.into());
+            if inside(&polygon, grid::cell_centre(cell)) {
+                grid.positions[cell] = anchor.position.into();
+                grid.known[cell] = true;
+            } else {
+                let [u, v] = anchor.uv;
+                wrong.push(FieldError::new(
+                    format!("/anchors/{i}/uv"),
+                    format!("[{u}, {v}] does not lie in the hole"),
+                ));
+            }
+        }
+        if wrong.is_empty() {
+            Ok(())
+        } else {
+            Err(MendError::Constraints(wrong))
+        }
+    }
+
+    fn grid_report(&self, grid: &Grid, normal: &Normalisation) -> v1::GridReport {
+        let spacing = grid::spacing(&grid.positions, |a, b| grid.known[a] && grid.known[b]);
+        let polygon: Vec<Vec2> = self.region.rim.iter().map(|v| self.chart.uv(*v)).collect();
+        v1::GridReport {
+            spacing_mean: normal.scale / grid::SIDE as f64,
+            spacing_variance: spacing.variance / (spacing.mean * spacing.mean),
+            known: grid.known_count() as f64 / grid::CELLS as f64,
+            hole: patch::signed_area(&polygon).abs(),
+        }
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let others = self.region.holes.len();
+        if others == 0 {
+            Vec::new()
+        } else {
+            vec![format!(
+                "{others} other hole(s) lie in the region and were unknown to the network"
+            )]
+        }
+    }
+}
+
+/// Reach of a region around a hole of this extent.
+fn reach_for(extent: f64) -> f64 {
+    0.5 * extent * (1.0 / SHARE - 1.0)
+}
+
+/// Whether a smaller region may do better.
+fn may_shrink(error: &MendError) -> bool {
+    match error {
+        MendError::Flatten { .. } => true,
+        MendError::Patch { source, .. } => *source == PatchError::RimCrosses,
+        _ => false,
+    }
+}
+
+/// Whether a point lies in a polygon (even–odd rule).
+fn inside(polygon: &[Vec2], p: Vec2) -> bool {
+    let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
+    let crossed = edges.filter(|(a, b)| {
+        (a.y <= p.y) != (b.y <= p.y) && a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x) > p.x
+    });
+    crossed.count() % 2 == 1
+}
+
+/// How far the patch stays away from an anchor, at the anchor's uv.
+fn kept(patch: &Patch, chart: &Chart, anchor: &Anchor) -> v1::AnchorReport {
+    let at = patch.at(chart.frame.point(anchor.uv.into()));
+    v1::AnchorReport {
+        distance: (at - Vec3::from(anchor.position)).norm(),
+    }
+}

@@ -1,0 +1,142 @@
+//! Which loops a request means, and which anchors belong to which.
+
+use std::collections::BTreeMap;
+
+use super::MendError;
+use super::cloth::{Cloth, kind};
+use crate::contract::{Anchor, Constraints, FieldError, HoleSelector, v1};
+use crate::mesh::Vec3;
+use crate::mesh::loops::{BoundaryLoop, LoopKind};
+use crate::mesh::nearest::distance_to_loop;
+
+/// What to fill and what not.
+pub struct Selection {
+    /// The loops to fill, in order of id.
+    pub chosen: Vec<Chosen>,
+    /// All others, in order of id.
+    pub skipped: Vec<v1::Skipped>,
+}
+
+/// A loop to fill.
+pub struct Chosen {
+    /// Its id, which is its place among the cloth's loops.
+    pub id: u32,
+    /// Its anchors, each with its place in the request.
+    pub anchors: Vec<(usize, Anchor)>,
+}
+
+/// Matches a request to the loops of a scan.
+///
+/// # Errors
+/// `Constraints` for every selector or anchor that matches no loop that may be filled; `NonManifold` when an asked-for rim is no closed line.
+pub fn select(cloth: &Cloth, constraints: &Constraints) -> Result<Selection, MendError> {
+    let mut wrong = Vec::new();
+    let mut chosen: BTreeMap<u32, Vec<(usize, Anchor)>> = BTreeMap::new();
+    if constraints.holes.is_empty() {
+        chosen.extend(
+            cloth
+                .loops
+                .iter()
+                .filter(|l| fillable(l))
+                .map(|l| (l.id, Vec::new())),
+        );
+    }
+    for (i, selector) in constraints.holes.iter().enumerate() {
+        match find(cloth, selector) {
+            Ok(id) => drop(chosen.entry(id).or_default()),
+            Err(detail) => wrong.push(FieldError::new(format!("/holes/{i}"), detail)),
+        }
+    }
+    for (i, anchor) in constraints.anchors.iter().enumerate() {
+        match owner(&chosen, anchor) {
+            Ok(id) => chosen.entry(id).or_default().push((i, *anchor)),
+            Err(detail) => wrong.push(FieldError::new(format!("/anchors/{i}/hole"), detail)),
+        }
+    }
+    if !wrong.is_empty() {
+        return Err(MendError::Constraints(wrong));
+    }
+    if let Some(hole) = chosen
+        .keys()
+        .copied()
+        .find(|id| cloth.loops[*id as usize].non_manifold)
+    {
+        return Err(MendError::NonManifold { hole });
+    }
+    let skipped = cloth
+        .loops
+        .iter()
+        .filter(|l| !chosen.contains_key(&l.id))
+        .map(|l| skipped(l))
+        .collect();
+    let chosen = chosen
+        .into_iter()
+        .map(|(id, anchors)| Chosen { id, anchors })
+        .collect();
+    Ok(Selection { chosen, skipped })
+}
+
+/// Whether a loop is filled when nobody asks.
+fn fillable(rim: &BoundaryLoop) -> bool {
+    rim.kind == LoopKind::Hole && !rim.non_manifold
+}
+
+fn find(cloth: &Cloth, selector: &HoleSelector) -> Result<u32, String> {
+    match selector {
+        HoleSelector::Id(id) => {
+            let rim = cloth.loops.get(*id as usize).ok_or_else(|| {
+                format!(
+                    "there is no loop {id}; the scan has {} boundary loop(s), numbered from 0",
+                    cloth.loops.len()
+                )
+            })?;
+            match rim.kind {
+                LoopKind::Hole => Ok(*id),
+                LoopKind::Outer => Err(format!(
+                    "loop {id} is the outer boundary, not a hole; it is never filled"
+                )),
+                LoopKind::TubeEnd => Err(format!(
+                    "loop {id} is the end of a tube, not a hole; it is never filled"
+                )),
+            }
+        }
+        HoleSelector::Near(point) => {
+            let point = Vec3::from(*point);
+            let holes = cloth.loops.iter().filter(|l| l.kind == LoopKind::Hole);
+            let near = holes.map(|l| (distance_to_loop(&cloth.welded.mesh, l, &point), l.id));
+            near.min_by(|a, b| a.0.total_cmp(&b.0))
+                .map(|(_, id)| id)
+                .ok_or_else(|| "the scan has no hole".to_owned())
+        }
+    }
+}
+
+fn owner(chosen: &BTreeMap<u32, Vec<(usize, Anchor)>>, anchor: &Anchor) -> Result<u32, String> {
+    match anchor.hole {
+        Some(id) if chosen.contains_key(&id) => Ok(id),
+        Some(id) => Err(format!("hole {id} is not among the holes to fill")),
+        None if chosen.len() == 1 => Ok(chosen.keys().copied().next().unwrap_or_default()),
+        None => Err(format!(
+            "{} holes are to be filled; say which one the anchor belongs to",
+            chosen.len()
+        )),
+    }
+}
+
+fn skipped(rim: &BoundaryLoop) -> v1::Skipped {
+    let (code, reason) = match rim.kind {
+        LoopKind::Outer => ("outer_boundary", "the cloth's own edge"),
+        LoopKind::TubeEnd => ("tube_end", "the end of a tube, such as a sleeve"),
+        LoopKind::Hole if rim.non_manifold => (
+            "non_manifold",
+            "its rim runs through edges shared by more than two triangles",
+        ),
+        LoopKind::Hole => ("not_selected", "the request chose other holes"),
+    };
+    v1::Skipped {
+        id: rim.id,
+        kind: kind(rim.kind) as i32,
+        code: code.to_owned(),
+        reason: reason.to_owned(),
+    }
+}
