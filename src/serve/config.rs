@@ -1,0 +1,206 @@
+//! Settings: a flag, or a `DARN_*` variable, and nothing else. All are parsed before anything is bound.
+
+use std::{net::SocketAddr, path::PathBuf, time::Duration};
+
+use clap::{Args, ValueEnum};
+
+use super::telemetry::LogFormat;
+
+/// Serve HTTP and gRPC.
+#[derive(Debug, Clone, Args)]
+pub struct ServeArgs {
+    /// Address to listen on, for HTTP and gRPC alike
+    #[arg(
+        long,
+        env = "DARN_LISTEN",
+        value_name = "ADDRESS",
+        default_value = "127.0.0.1:8080"
+    )]
+    pub listen: SocketAddr,
+
+    /// Address for gRPC alone; left out, gRPC shares the port
+    #[arg(long, env = "DARN_GRPC_LISTEN", value_name = "ADDRESS")]
+    pub grpc_listen: Option<SocketAddr>,
+
+    /// Scans mended at once; left out, one per processor
+    #[arg(long, env = "DARN_WORKERS", value_name = "N", value_parser = count)]
+    pub workers: Option<usize>,
+
+    /// Scans that may wait for a worker; more are refused with 503
+    #[arg(long, env = "DARN_QUEUE", value_name = "N", default_value = "32", value_parser = count_or_none)]
+    pub queue: usize,
+
+    /// Longest time a scan may wait and be mended, such as 30s or 500ms
+    #[arg(long, env = "DARN_DEADLINE", value_name = "TIME", default_value = "60s", value_parser = duration)]
+    pub deadline: Duration,
+
+    /// Largest request body, such as 64MiB
+    #[arg(long, env = "DARN_BODY_LIMIT", value_name = "SIZE", default_value = "128MiB", value_parser = size)]
+    pub body_limit: usize,
+
+    /// Longest pause between two pieces of a request body; the whole may take eight times as long
+    #[arg(long, env = "DARN_BODY_TIMEOUT", value_name = "TIME", default_value = "15s", value_parser = duration)]
+    pub body_timeout: Duration,
+
+    /// Longest time a shutdown waits for requests under way
+    #[arg(long, env = "DARN_DRAIN", value_name = "TIME", default_value = "20s", value_parser = duration)]
+    pub drain: Duration,
+
+    /// Most triangles a scan may have
+    #[arg(long, env = "DARN_MAX_FACES", value_name = "N", default_value = "4000000", value_parser = count)]
+    pub max_faces: usize,
+
+    /// Origins of web pages that may call the service; `*` for any
+    #[arg(
+        long,
+        env = "DARN_ALLOW_ORIGIN",
+        value_name = "ORIGIN",
+        value_delimiter = ','
+    )]
+    pub allow_origin: Vec<String>,
+
+    /// Directory or file of the weights; left out, the shipped ones
+    #[arg(long, env = "DARN_WEIGHTS", value_name = "PATH")]
+    pub weights: Option<PathBuf>,
+
+    /// What runs the network
+    #[arg(
+        long,
+        env = "DARN_BACKEND",
+        value_name = "NAME",
+        default_value = "flex"
+    )]
+    pub backend: Backend,
+
+    /// Which log lines are written, such as info or darn=debug
+    #[arg(long, env = "DARN_LOG", value_name = "FILTER", default_value = "info")]
+    pub log: String,
+
+    /// How log lines look
+    #[arg(
+        long,
+        env = "DARN_LOG_FORMAT",
+        value_name = "FORMAT",
+        default_value = "text"
+    )]
+    pub log_format: LogFormat,
+}
+
+/// What runs the network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Backend {
+    /// burn's flex: fast on a processor.
+    Flex,
+    /// burn's ndarray: slow, the numerical reference.
+    Ndarray,
+}
+
+impl ServeArgs {
+    /// Worker threads: as set, else one per processor.
+    pub fn workers(&self) -> usize {
+        self.workers.unwrap_or_else(|| {
+            std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+        })
+    }
+}
+
+fn count(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(0) => Err("must be at least 1".to_owned()),
+        Ok(count) => Ok(count),
+        Err(_) => Err("must be a whole number".to_owned()),
+    }
+}
+
+fn count_or_none(text: &str) -> Result<usize, String> {
+    text.parse()
+        .map_err(|_| "must be a whole number".to_owned())
+}
+
+/// `64MiB`, `512KiB`, `1GiB` or plain bytes.
+fn size(text: &str) -> Result<usize, String> {
+    let (number, unit) = split(text);
+    let factor: usize = match unit {
+        "" | "B" => 1,
+        "KiB" => 1 << 10,
+        "MiB" => 1 << 20,
+        "GiB" => 1 << 30,
+        _ => return Err("unit must be B, KiB, MiB or GiB".to_owned()),
+    };
+    let number: usize = number
+        .parse()
+        .map_err(|_| "must be a whole number and a unit, such as 64MiB")?;
+    match number.checked_mul(factor) {
+        Some(0) | None => {
+            Err("must be at least 1 byte and at most what memory can address".to_owned())
+        }
+        Some(bytes) => Ok(bytes),
+    }
+}
+
+/// `30s`, `500ms`, `2m`.
+fn duration(text: &str) -> Result<Duration, String> {
+    let (number, unit) = split(text);
+    let milliseconds: u64 = match unit {
+        "ms" => 1,
+        "s" => 1000,
+        "m" => 60_000,
+        _ => return Err("needs a unit: ms, s or m".to_owned()),
+    };
+    let number: u64 = number
+        .parse()
+        .map_err(|_| "must be a whole number and a unit, such as 30s")?;
+    // A year is longer than anything waits, and far from overflowing an instant.
+    match number.checked_mul(milliseconds) {
+        Some(ms @ 1..=31_536_000_000) => Ok(Duration::from_millis(ms)),
+        _ => Err("must be between 1ms and a year".to_owned()),
+    }
+}
+
+fn split(text: &str) -> (&str, &str) {
+    let end = text
+        .find(|c: char| !c.is_ascii_digit())
+        .unwrap_or(text.len());
+    text.split_at(end)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Debug, Parser)]
+    struct Command {
+        #[command(flatten)]
+        serve: ServeArgs,
+    }
+
+    #[test]
+    fn settings_have_units_and_bounds() {
+        assert_eq!(size("64MiB"), Ok(64 << 20));
+        assert_eq!(size("12"), Ok(12));
+        assert_eq!(duration("500ms"), Ok(Duration::from_millis(500)));
+        assert_eq!(duration("2m"), Ok(Duration::from_secs(120)));
+        for bad in ["", "0", "MiB", "1MB", "-1", "99999999999999GiB"] {
+            assert!(size(bad).is_err(), "{bad}");
+        }
+        for bad in ["", "30", "0s", "s", "99999999999m", "18446744073709551615m"] {
+            assert!(duration(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn defaults_parse_and_bad_values_are_named() {
+        let settings = Command::try_parse_from(["darn"]).unwrap().serve;
+        assert_eq!(settings.body_limit, 128 << 20);
+        assert!(settings.workers() >= 1);
+        let error = Command::try_parse_from(["darn", "--workers", "0"])
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("--workers") && error.contains("at least 1"),
+            "{error}"
+        );
+    }
+}

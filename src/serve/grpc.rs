@@ -1,0 +1,186 @@
+//! The gRPC door: the same jobs, limits and errors as the HTTP one.
+
+use std::{
+    pin::Pin,
+    sync::Arc,
+    task::{Context, Poll},
+};
+
+use bytes::{Bytes, BytesMut};
+use tonic::{Code, Request, Response, Status, Streaming, codegen::tokio_stream::Stream};
+
+use super::{
+    app::App,
+    errors::Mended,
+    intake::{Asked, Patience},
+    problem::Fault,
+    telemetry::RequestId,
+};
+use crate::contract::{
+    Constraints,
+    v1::{
+        AnchorFound, HolesReport, InpaintChunk, ScanChunk,
+        darn_server::{Darn, DarnServer},
+        inpaint_chunk::Part,
+    },
+};
+
+/// Bytes of a scan per message of an answer.
+const CHUNK: usize = 256 << 10;
+/// What a message may hold beside the scan's bytes.
+const MARGIN: usize = 1 << 20;
+
+/// The service, ready to be routed.
+pub fn service(app: &Arc<App>) -> DarnServer<Door> {
+    DarnServer::new(Door(Arc::clone(app)))
+        .max_decoding_message_size(app.limits.body.saturating_add(MARGIN))
+        .max_encoding_message_size(usize::MAX)
+}
+
+/// Answers gRPC calls.
+#[derive(Debug)]
+pub struct Door(Arc<App>);
+
+#[tonic::async_trait]
+impl Darn for Door {
+    type InpaintStream = Chunks;
+
+    async fn find_holes(
+        &self,
+        request: Request<Streaming<ScanChunk>>,
+    ) -> Result<Response<HolesReport>, Status> {
+        let id = id(&request);
+        self.holes(request.into_inner())
+            .await
+            .map(Response::new)
+            .map_err(|fault| fault.grpc(&id))
+    }
+
+    async fn inpaint(
+        &self,
+        request: Request<Streaming<ScanChunk>>,
+    ) -> Result<Response<Chunks>, Status> {
+        let id = id(&request);
+        let mended = self
+            .mend(request.into_inner())
+            .await
+            .map_err(|fault| fault.grpc(&id))?;
+        Ok(Response::new(Chunks::of(mended)))
+    }
+
+    async fn optimize_anchor(
+        &self,
+        request: Request<Streaming<ScanChunk>>,
+    ) -> Result<Response<AnchorFound>, Status> {
+        Err(Fault::NotServed.grpc(&id(&request)))
+    }
+}
+
+impl Door {
+    async fn holes(&self, stream: Streaming<ScanChunk>) -> Result<HolesReport, Fault> {
+        let Asked { scan, place, .. } = self.read(stream).await?.unconstrained()?;
+        self.0
+            .submit(place, move |menders| menders.find_holes(&scan))
+            .await
+    }
+
+    async fn mend(&self, stream: Streaming<ScanChunk>) -> Result<Mended, Fault> {
+        let Asked {
+            scan,
+            constraints,
+            place,
+        } = self.read(stream).await?;
+        let constraints = constraints.unwrap_or_default();
+        let mended = self
+            .0
+            .submit(place, move |menders| menders.inpaint(&scan, &constraints))
+            .await?;
+        self.0.metrics.mended(&mended.report);
+        Ok(mended)
+    }
+
+    async fn read(&self, mut stream: Streaming<ScanChunk>) -> Result<Asked, Fault> {
+        let place = self.0.admit()?;
+        let limit = self.0.limits.body;
+        let patience = Patience::new(&self.0.limits);
+        let mut constraints = None;
+        let mut scan = BytesMut::new();
+        let mut first = true;
+        while let Some(chunk) = patience
+            .next(stream.message())
+            .await?
+            .map_err(|status| broken(&status, limit))?
+        {
+            if let Some(message) = chunk.constraints {
+                if !first {
+                    return Err(Fault::Malformed(
+                        "only the first chunk carries constraints".to_owned(),
+                    ));
+                }
+                constraints = Some(Constraints::check(&message).map_err(Fault::Constraints)?);
+            }
+            if chunk.query.is_some() {
+                return Err(Fault::Malformed(
+                    "only OptimizeAnchor takes a query".to_owned(),
+                ));
+            }
+            if scan.len() + chunk.data.len() > limit {
+                return Err(Fault::TooLarge { limit });
+            }
+            scan.extend_from_slice(&chunk.data);
+            first = false;
+        }
+        if scan.is_empty() {
+            return Err(Fault::EmptyBody);
+        }
+        Ok(Asked {
+            scan: scan.freeze(),
+            constraints,
+            place,
+        })
+    }
+}
+
+fn broken(status: &Status, limit: usize) -> Fault {
+    match status.code() {
+        // What tonic says of a message above its limit.
+        Code::OutOfRange => Fault::TooLarge { limit },
+        _ => Fault::Malformed(format!("the stream broke off: {}", status.message())),
+    }
+}
+
+fn id<T>(request: &Request<T>) -> String {
+    request
+        .extensions()
+        .get::<RequestId>()
+        .map(|id| id.0.clone())
+        .unwrap_or_default()
+}
+
+/// An answer in chunks: the report, then the scan.
+#[derive(Debug)]
+pub struct Chunks {
+    report: Option<Part>,
+    scan: Bytes,
+}
+
+impl Chunks {
+    fn of(mended: Mended) -> Self {
+        Self {
+            report: Some(Part::Report(mended.report)),
+            scan: mended.bytes.into(),
+        }
+    }
+}
+
+impl Stream for Chunks {
+    type Item = Result<InpaintChunk, Status>;
+
+    fn poll_next(mut self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<Option<Self::Item>> {
+        let part = self.report.take().or_else(|| {
+            let next = self.scan.len().min(CHUNK);
+            (next > 0).then(|| Part::Data(self.scan.split_to(next)))
+        });
+        Poll::Ready(part.map(|part| Ok(InpaintChunk { part: Some(part) })))
+    }
+}

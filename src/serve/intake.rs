@@ -1,0 +1,265 @@
+//! Reads a request's body: its bytes within the limit, then the scan and the constraints in them.
+
+use std::{future::poll_fn, pin::Pin};
+
+use axum::{
+    body::{Body, HttpBody},
+    extract::{FromRequest, Multipart, Request, multipart::MultipartError},
+    http::{HeaderMap, header, request::Parts},
+};
+use bytes::{Bytes, BytesMut};
+use tokio::time::{Duration, Instant, timeout, timeout_at};
+
+use super::{app::Limits, pool::Admission, problem::Fault};
+use crate::contract::{Constraints, FieldError, from_json, v1};
+
+/// Bytes of an unwanted body read on, as a multiple of the limit, so that the caller gets to see the answer.
+const DRAIN_FACTOR: u64 = 4;
+/// Longest time an unwanted body is read on.
+const DRAIN_TIME: Duration = Duration::from_secs(20);
+/// How many of the longest pauses a whole body may take.
+const PAUSES: u32 = 8;
+/// Largest constraints, in bytes.
+const CONSTRAINTS_LIMIT: usize = 1 << 20;
+
+/// What a request carries.
+#[derive(Debug)]
+pub struct Asked {
+    /// The scan's bytes; not empty.
+    pub scan: Bytes,
+    /// The constraints, checked; none when none came.
+    pub constraints: Option<Constraints>,
+    /// The place in the queue this request holds.
+    pub place: Admission,
+}
+
+impl Asked {
+    /// The same, for a job that takes no constraints.
+    ///
+    /// # Errors
+    /// `Constraints` when some came.
+    pub fn unconstrained(self) -> Result<Self, Fault> {
+        if self.constraints.is_none() {
+            return Ok(self);
+        }
+        let detail = "finding holes takes no constraints in this version";
+        Err(Fault::Constraints(vec![FieldError::new("", detail)]))
+    }
+}
+
+/// When a body must have come.
+#[derive(Debug)]
+pub struct Patience {
+    pause: Duration,
+    end: Instant,
+}
+
+impl Patience {
+    /// Starts now.
+    pub fn new(limits: &Limits) -> Self {
+        let end = Instant::now() + limits.body_pause * PAUSES;
+        Self {
+            pause: limits.body_pause,
+            end,
+        }
+    }
+
+    /// Waits for the next piece of a body.
+    ///
+    /// # Errors
+    /// `BodyTimeout` after too long a pause, or when the whole takes too long: a trickle would hold its place for ever.
+    pub async fn next<T>(&self, piece: impl Future<Output = T>) -> Result<T, Fault> {
+        let until = self.end.min(Instant::now() + self.pause);
+        (timeout_at(until, piece).await).map_err(|_| Fault::BodyTimeout {
+            seconds: self.pause.as_secs_f64(),
+            whole: (self.pause * PAUSES).as_secs_f64(),
+        })
+    }
+}
+
+/// The media types a scan comes in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Envelope {
+    Raw,
+    Multipart,
+}
+
+/// Reads a request whose headers have been accepted. The body is read to its end even when it is refused.
+///
+/// # Errors
+/// `UnsupportedMediaType`, `TooLarge`, `BodyTimeout`, `EmptyBody`, `Malformed` or `Constraints`.
+pub async fn asked(request: Request, place: Admission, limits: &Limits) -> Result<Asked, Fault> {
+    let (parts, mut body) = request.into_parts();
+    let read = async {
+        let envelope = envelope(&parts.headers)?;
+        announced(&parts.headers, limits.body)?;
+        Ok((envelope, read(&mut body, limits).await?))
+    };
+    let (envelope, bytes) = match read.await {
+        Ok(read) => read,
+        Err(fault) => {
+            drop(place);
+            if !matches!(fault, Fault::BodyTimeout { .. }) {
+                refuse(&parts.headers, body, limits).await;
+            }
+            return Err(fault);
+        }
+    };
+    let (scan, constraints) = match envelope {
+        Envelope::Raw => (bytes, None),
+        Envelope::Multipart => split(parts, bytes).await?,
+    };
+    if scan.is_empty() {
+        return Err(Fault::EmptyBody);
+    }
+    Ok(Asked {
+        scan,
+        constraints,
+        place,
+    })
+}
+
+/// Reads an unwanted body on, within bounds: a caller that is still sending would otherwise see a broken connection and
+/// not the answer. One that waits to be told to send is just not told.
+pub async fn refuse(headers: &HeaderMap, mut body: Body, limits: &Limits) {
+    if headers.contains_key(header::EXPECT) {
+        return;
+    }
+    let most = (limits.body as u64).saturating_mul(DRAIN_FACTOR);
+    let drained = async {
+        let mut seen = 0;
+        while let Some(Ok(piece)) = piece(&mut body).await {
+            seen += piece.len() as u64;
+            if seen > most {
+                return;
+            }
+        }
+    };
+    timeout(DRAIN_TIME, drained).await.ok();
+}
+
+fn envelope(headers: &HeaderMap) -> Result<Envelope, Fault> {
+    let got = headers
+        .get(header::CONTENT_TYPE)
+        .map_or("", |value| value.to_str().unwrap_or("(not text)"));
+    match got
+        .split(';')
+        .next()
+        .unwrap_or_default()
+        .trim()
+        .to_ascii_lowercase()
+        .as_str()
+    {
+        "model/gltf-binary" | "model/gltf+json" => Ok(Envelope::Raw),
+        "multipart/form-data" => Ok(Envelope::Multipart),
+        _ => Err(Fault::UnsupportedMediaType {
+            got: if got.is_empty() {
+                "(none)".to_owned()
+            } else {
+                format!("`{}`", cut(got, 100))
+            },
+        }),
+    }
+}
+
+fn announced(headers: &HeaderMap, limit: usize) -> Result<(), Fault> {
+    let length = (headers.get(header::CONTENT_LENGTH))
+        .and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
+    match length {
+        Some(length) if length > limit as u64 => Err(Fault::TooLarge { limit }),
+        _ => Ok(()),
+    }
+}
+
+async fn read(body: &mut Body, limits: &Limits) -> Result<Bytes, Fault> {
+    let patience = Patience::new(limits);
+    let mut bytes = BytesMut::new();
+    while let Some(piece) = patience.next(piece(body)).await? {
+        let piece =
+            piece.map_err(|error| Fault::Malformed(format!("the body broke off: {error}")))?;
+        if bytes.len() + piece.len() > limits.body {
+            return Err(Fault::TooLarge { limit: limits.body });
+        }
+        bytes.extend_from_slice(&piece);
+    }
+    Ok(bytes.freeze())
+}
+
+async fn piece(body: &mut Body) -> Option<Result<Bytes, axum::Error>> {
+    loop {
+        match poll_fn(|cx| Pin::new(&mut *body).poll_frame(cx)).await? {
+            Ok(frame) => {
+                if let Ok(data) = frame.into_data() {
+                    return Some(Ok(data));
+                }
+            }
+            Err(error) => return Some(Err(error)),
+        }
+    }
+}
+
+async fn split(parts: Parts, bytes: Bytes) -> Result<(Bytes, Option<Constraints>), Fault> {
+    let malformed = |error: MultipartError| {
+        Fault::Malformed(format!("the multipart body: {}", error.body_text()))
+    };
+    let request = Request::from_parts(parts, Body::from(bytes));
+    let mut form = (Multipart::from_request(request, &()).await).map_err(|rejection| {
+        Fault::Malformed(format!("the multipart body: {}", rejection.body_text()))
+    })?;
+    let mut scan = None;
+    let mut constraints = None;
+    while let Some(field) = form.next_field().await.map_err(malformed)? {
+        let name = field.name().unwrap_or_default().to_owned();
+        let media = field.content_type().map(|media| {
+            media
+                .split(';')
+                .next()
+                .unwrap_or_default()
+                .trim()
+                .to_ascii_lowercase()
+        });
+        let (slot, read): (_, &[&str]) = match name.as_str() {
+            "scan" => (
+                &mut scan,
+                &[
+                    "model/gltf-binary",
+                    "model/gltf+json",
+                    "application/octet-stream",
+                ],
+            ),
+            "constraints" => (&mut constraints, &["application/json"]),
+            _ => {
+                let name = cut(&name, 100);
+                return Err(Fault::Malformed(format!(
+                    "there is no part `{name}`; the parts are `scan` and `constraints`"
+                )));
+            }
+        };
+        if let Some(media) = media.filter(|media| !read.contains(&media.as_str())) {
+            return Err(Fault::UnsupportedMediaType {
+                got: format!("`{}` of part `{name}`", cut(&media, 100)),
+            });
+        }
+        if slot
+            .replace(field.bytes().await.map_err(malformed)?)
+            .is_some()
+        {
+            return Err(Fault::Malformed(format!("the part `{name}` comes twice")));
+        }
+    }
+    let constraints = constraints.map(|text| parse(&text)).transpose()?;
+    Ok((scan.ok_or(Fault::EmptyBody)?, constraints))
+}
+
+fn parse(text: &[u8]) -> Result<Constraints, Fault> {
+    if text.len() > CONSTRAINTS_LIMIT {
+        let detail = format!("{} bytes; the limit is {CONSTRAINTS_LIMIT}", text.len());
+        return Err(Fault::Constraints(vec![FieldError::new("", detail)]));
+    }
+    let message: v1::Constraints = from_json(text)?;
+    Constraints::check(&message).map_err(Fault::Constraints)
+}
+
+fn cut(text: &str, most: usize) -> String {
+    text.chars().take(most).collect()
+}

@@ -1,0 +1,209 @@
+//! The service: settings, HTTP and gRPC doors, worker pool, problem documents, metrics, logs, shutdown.
+//! May use: contract, axum, tonic, tokio, and whatever mends through the seam in `errors`.
+//! May not live here: geometry, glTF, networks; nothing here blocks an async thread.
+
+mod app;
+mod config;
+mod errors;
+mod grpc;
+mod healthcheck;
+mod intake;
+pub mod openapi;
+mod pool;
+mod problem;
+mod routes;
+mod schema;
+mod shutdown;
+mod telemetry;
+
+use std::{future::IntoFuture as _, io, net::SocketAddr, sync::Arc, time::Duration};
+
+use axum::{Router, serve::ListenerExt as _};
+use tokio::{net::TcpListener, runtime, time};
+use tokio_util::sync::CancellationToken;
+use tracing::{error, info};
+
+pub use self::{
+    app::App,
+    config::{Backend, ServeArgs},
+    errors::{Class, Mended, Menders, Refusal},
+    healthcheck::{HealthError, healthcheck},
+    telemetry::{LogFormat, start_logging},
+};
+
+/// How often recorded samples are folded into their histograms.
+const UPKEEP: Duration = Duration::from_secs(5);
+
+/// Why the service could not start, or ended.
+#[derive(Debug, thiserror::Error)]
+pub enum ServeError {
+    /// An address that cannot be listened on.
+    #[error("cannot listen on {address}: {source}")]
+    Bind {
+        /// The address, as set.
+        address: SocketAddr,
+        /// Why not.
+        source: io::Error,
+    },
+    /// Threads, signals or sockets failed.
+    #[error("the service failed: {0}")]
+    Io(#[from] io::Error),
+    /// The warm-up mend failed: no request could succeed.
+    #[error("the warm-up mend failed: {0}")]
+    WarmUp(String),
+}
+
+/// Serves until a signal comes or something breaks; blocks.
+///
+/// # Errors
+/// See [`ServeError`].
+pub fn run(settings: &ServeArgs, menders: Arc<dyn Menders>) -> Result<(), ServeError> {
+    let runtime = runtime::Builder::new_multi_thread().enable_all().build()?;
+    let outcome = runtime.block_on(async {
+        let sockets = Sockets::bind(settings.listen, settings.grpc_listen).await?;
+        let app = App::start(settings, menders)?;
+        let stop = CancellationToken::new();
+        shutdown::on_signal(stop.clone())?;
+        serve(sockets, app, stop, settings.drain).await
+    });
+    // A mend that nobody waits for may still run; the process does not wait for it either.
+    runtime.shutdown_background();
+    outcome
+}
+
+/// Bound sockets: one for both doors, or one each.
+#[derive(Debug)]
+pub struct Sockets {
+    /// HTTP, and gRPC when it has none of its own.
+    pub http: TcpListener,
+    /// gRPC alone.
+    pub grpc: Option<TcpListener>,
+}
+
+impl Sockets {
+    /// Binds them.
+    ///
+    /// # Errors
+    /// `Bind`, naming the address.
+    pub async fn bind(http: SocketAddr, grpc: Option<SocketAddr>) -> Result<Self, ServeError> {
+        let listen = async |address| {
+            TcpListener::bind(address)
+                .await
+                .map_err(|source| ServeError::Bind { address, source })
+        };
+        Ok(Self {
+            http: listen(http).await?,
+            grpc: match grpc {
+                Some(address) => Some(listen(address).await?),
+                None => None,
+            },
+        })
+    }
+}
+
+/// Serves on bound sockets until `stop` is cancelled, then drains no longer than `drain`.
+///
+/// # Errors
+/// When a socket breaks or the warm-up fails.
+pub async fn serve(
+    sockets: Sockets,
+    app: Arc<App>,
+    stop: CancellationToken,
+    drain: Duration,
+) -> Result<(), ServeError> {
+    info!(address = %sockets.http.local_addr()?, "listening");
+    let mut doors = tokio::task::JoinSet::new();
+    if let Some(socket) = sockets.grpc {
+        info!(address = %socket.local_addr()?, "listening for grpc alone");
+        doors.spawn(open(socket, grpc_router(&app), stop.clone()));
+        doors.spawn(open(sockets.http, http_router(&app), stop.clone()));
+    } else {
+        doors.spawn(open(sockets.http, router(&app), stop.clone()));
+    }
+    let upkeep = tokio::spawn(upkeep(Arc::clone(&app)));
+    let drained = tokio::spawn({
+        let (app, stop) = (Arc::clone(&app), stop.clone());
+        async move {
+            stop.cancelled().await;
+            app.drain();
+        }
+    });
+
+    let warm_up = {
+        let (app, stop) = (Arc::clone(&app), stop.clone());
+        async move {
+            let outcome = app.warm_up().await;
+            match &outcome {
+                Ok(()) => info!("ready"),
+                Err(problem::Fault::Draining) => return Ok(()),
+                Err(fault) => {
+                    error!(%fault, "the warm-up mend failed");
+                    stop.cancel();
+                }
+            }
+            outcome
+        }
+    };
+    let warm_up = tokio::spawn(warm_up);
+
+    let serving = async {
+        while let Some(door) = doors.join_next().await {
+            door.map_err(io::Error::other)??;
+        }
+        Ok::<(), io::Error>(())
+    };
+    let outcome = shutdown::bounded(serving, &stop, drain).await;
+    let stopped_early = !stop.is_cancelled();
+    stop.cancel();
+    upkeep.abort();
+    drained.abort();
+    if warm_up.is_finished() {
+        if let Ok(Err(fault)) = warm_up.await {
+            return Err(ServeError::WarmUp(fault.to_string()));
+        }
+    } else {
+        warm_up.abort();
+    }
+    app.drain();
+    info!(early = stopped_early, "stopped");
+    outcome.unwrap_or(Ok(())).map_err(ServeError::Io)
+}
+
+/// Both doors.
+pub fn router(app: &Arc<App>) -> Router {
+    routes::finish(routes::routes().merge(grpc_routes(app)), app)
+}
+
+fn http_router(app: &Arc<App>) -> Router {
+    routes::finish(routes::routes(), app)
+}
+
+fn grpc_router(app: &Arc<App>) -> Router {
+    routes::finish(grpc_routes(app), app)
+}
+
+fn grpc_routes(app: &Arc<App>) -> Router<Arc<App>> {
+    use tower::ServiceExt as _;
+    let service = grpc::service(app)
+        .map_request(|request: axum::extract::Request| request.map(tonic::body::Body::new));
+    Router::new().route_service("/darn.v1.Darn/{method}", service)
+}
+
+async fn open(socket: TcpListener, router: Router, stop: CancellationToken) -> io::Result<()> {
+    let socket = socket.tap_io(|stream| {
+        // Only costs latency when it fails.
+        stream.set_nodelay(true).ok();
+    });
+    axum::serve(socket, router)
+        .with_graceful_shutdown(stop.cancelled_owned())
+        .into_future()
+        .await
+}
+
+async fn upkeep(app: Arc<App>) {
+    let mut tick = time::interval(UPKEEP);
+    loop {
+        tick.tick().await;
+        app.metrics.upkeep();
+    }
+}

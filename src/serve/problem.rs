@@ -1,0 +1,273 @@
+//! Every error a caller can meet, in one table, and its two shapes: a problem document (RFC 9457) and a gRPC status.
+
+use axum::{
+    body::Body,
+    http::{HeaderMap, HeaderValue, StatusCode, header},
+    response::{IntoResponse, Response},
+};
+use serde::Serialize;
+use tonic::{Code, metadata::MetadataValue};
+
+use super::errors::{Class, Refusal};
+use crate::contract::{FieldError, JsonError};
+
+/// Media type of a problem document.
+pub const MEDIA_TYPE: &str = "application/problem+json";
+
+/// Why a request was not answered.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Fault {
+    /// No scan came.
+    #[error(
+        "the request carries no scan; send its bytes as the body, or as the part `scan` of multipart/form-data"
+    )]
+    EmptyBody,
+    /// The request cannot be read.
+    #[error("{0}")]
+    Malformed(String),
+    /// No such path.
+    #[error("there is nothing at this path; /openapi.json lists what there is")]
+    NotFound,
+    /// The path has other methods.
+    #[error("this path does not take this method; the header `allow` lists those it takes")]
+    MethodNotAllowed,
+    /// The body stopped coming.
+    #[error(
+        "the body came too slowly: no pause may last longer than {seconds} s (DARN_BODY_TIMEOUT), and the whole no longer than {whole} s"
+    )]
+    BodyTimeout {
+        /// Longest pause.
+        seconds: f64,
+        /// Longest time for the whole.
+        whole: f64,
+    },
+    /// The body is larger than the limit.
+    #[error("the body is larger than {limit} bytes, the limit of this service (DARN_BODY_LIMIT)")]
+    TooLarge {
+        /// The limit, in bytes.
+        limit: usize,
+    },
+    /// The content type is none of ours.
+    #[error(
+        "content type {got} is not read here; send model/gltf-binary, model/gltf+json or multipart/form-data"
+    )]
+    UnsupportedMediaType {
+        /// What came.
+        got: String,
+    },
+    /// Constraints that cannot be met by any scan.
+    #[error("the constraints are not valid; `errors` names every field")]
+    Constraints(Vec<FieldError>),
+    /// The scan was refused.
+    #[error("{}", if .0.class == Class::Internal { INTERNAL } else { .0.detail.as_str() })]
+    Refused(Refusal),
+    /// A method of later versions.
+    #[error("not served by this version yet")]
+    NotServed,
+    /// Too many jobs wait.
+    #[error(
+        "{waiting} jobs wait and {running} run, which is all this service takes (DARN_QUEUE); try again in {retry_after} s"
+    )]
+    QueueFull {
+        /// Jobs waiting.
+        waiting: usize,
+        /// Jobs running.
+        running: usize,
+        /// Estimated seconds until there is room.
+        retry_after: u64,
+    },
+    /// The service shuts down.
+    #[error("the service is shutting down")]
+    Draining,
+    /// The service is not warm yet.
+    #[error("the service is still warming up")]
+    WarmingUp,
+    /// Waiting and running took too long.
+    #[error(
+        "waiting and mending took longer than {seconds} s, the limit of this service (DARN_DEADLINE)"
+    )]
+    Deadline {
+        /// The limit.
+        seconds: f64,
+    },
+    /// Our own fault.
+    #[error("{INTERNAL}")]
+    Internal,
+}
+
+const INTERNAL: &str = "an error of the service itself; its log has it under this request id";
+
+struct Row(StatusCode, &'static str, Code);
+
+impl Fault {
+    fn row(&self) -> Row {
+        use StatusCode as S;
+        match self {
+            Self::EmptyBody => Row(S::BAD_REQUEST, "empty_body", Code::InvalidArgument),
+            Self::Malformed(_) => Row(S::BAD_REQUEST, "malformed_request", Code::InvalidArgument),
+            Self::NotFound => Row(S::NOT_FOUND, "not_found", Code::Unimplemented),
+            Self::MethodNotAllowed => Row(
+                S::METHOD_NOT_ALLOWED,
+                "method_not_allowed",
+                Code::Unimplemented,
+            ),
+            Self::BodyTimeout { .. } => Row(S::REQUEST_TIMEOUT, "body_timeout", Code::Aborted),
+            Self::TooLarge { .. } => Row(
+                S::PAYLOAD_TOO_LARGE,
+                "body_too_large",
+                Code::ResourceExhausted,
+            ),
+            Self::UnsupportedMediaType { .. } => Row(
+                S::UNSUPPORTED_MEDIA_TYPE,
+                "unsupported_media_type",
+                Code::InvalidArgument,
+            ),
+            Self::Constraints(_) => Row(
+                S::UNPROCESSABLE_ENTITY,
+                "invalid_constraints",
+                Code::InvalidArgument,
+            ),
+            Self::Refused(refusal) => match refusal.class {
+                Class::Malformed => Row(S::BAD_REQUEST, refusal.code, Code::InvalidArgument),
+                Class::TooLarge => Row(S::PAYLOAD_TOO_LARGE, refusal.code, Code::ResourceExhausted),
+                Class::Unprocessable => Row(
+                    S::UNPROCESSABLE_ENTITY,
+                    refusal.code,
+                    Code::FailedPrecondition,
+                ),
+                Class::Internal => Row(S::INTERNAL_SERVER_ERROR, "internal", Code::Internal),
+            },
+            Self::NotServed => Row(S::NOT_IMPLEMENTED, "not_served", Code::Unimplemented),
+            Self::QueueFull { .. } => Row(S::SERVICE_UNAVAILABLE, "queue_full", Code::Unavailable),
+            Self::Draining => Row(S::SERVICE_UNAVAILABLE, "draining", Code::Unavailable),
+            Self::WarmingUp => Row(S::SERVICE_UNAVAILABLE, "warming_up", Code::Unavailable),
+            Self::Deadline { .. } => Row(
+                S::GATEWAY_TIMEOUT,
+                "deadline_exceeded",
+                Code::DeadlineExceeded,
+            ),
+            Self::Internal => Row(S::INTERNAL_SERVER_ERROR, "internal", Code::Internal),
+        }
+    }
+
+    /// The HTTP status.
+    pub fn status(&self) -> StatusCode {
+        self.row().0
+    }
+
+    /// Stable word for programs.
+    pub fn code(&self) -> &'static str {
+        self.row().1
+    }
+
+    fn fields(&self) -> &[FieldError] {
+        match self {
+            Self::Constraints(fields) => fields,
+            Self::Refused(refusal) if refusal.class != Class::Internal => &refusal.fields,
+            _ => &[],
+        }
+    }
+
+    fn retry_after(&self) -> Option<u64> {
+        match self {
+            Self::QueueFull { retry_after, .. } => Some(*retry_after),
+            Self::Draining | Self::WarmingUp => Some(5),
+            _ => None,
+        }
+    }
+
+    /// The problem document, under the request's id.
+    pub fn document(&self, request_id: &str) -> Problem {
+        let Row(status, code, _) = self.row();
+        Problem {
+            kind: "about:blank",
+            title: status.canonical_reason().unwrap_or("Error"),
+            status: status.as_u16(),
+            code,
+            detail: self.to_string(),
+            request_id: request_id.to_owned(),
+            errors: (self.fields().iter())
+                .map(|field| ProblemField {
+                    pointer: field.pointer.clone(),
+                    detail: field.detail.clone(),
+                })
+                .collect(),
+        }
+    }
+
+    /// The HTTP answer, whole; keeps `headers` that were set for it before, such as `allow`.
+    pub fn render(&self, request_id: &str, mut headers: HeaderMap) -> Response {
+        headers.remove(header::CONTENT_LENGTH);
+        headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(MEDIA_TYPE));
+        headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
+        if let Some(seconds) = self.retry_after() {
+            headers.insert(header::RETRY_AFTER, HeaderValue::from(seconds));
+        }
+        let body = serde_json::to_vec(&self.document(request_id)).unwrap_or_default();
+        let mut response = Response::new(Body::from(body));
+        *response.status_mut() = self.status();
+        *response.headers_mut() = headers;
+        response
+    }
+
+    /// The gRPC status: the same code as `darn-code`, the same document as `darn-problem-bin`.
+    pub fn grpc(&self, request_id: &str) -> tonic::Status {
+        let Row(_, code, grpc) = self.row();
+        let mut status = tonic::Status::new(grpc, self.to_string());
+        let document = serde_json::to_vec(&self.document(request_id)).unwrap_or_default();
+        let metadata = status.metadata_mut();
+        metadata.insert("darn-code", MetadataValue::from_static(code));
+        metadata.insert_bin("darn-problem-bin", MetadataValue::from_bytes(&document));
+        if let Some(seconds) = self.retry_after() {
+            metadata.insert("retry-after", MetadataValue::from(seconds));
+        }
+        status
+    }
+}
+
+/// Handlers return faults bare; the outermost layer, which knows the request's id, renders them.
+impl IntoResponse for Fault {
+    fn into_response(self) -> Response {
+        let mut response = Response::new(Body::empty());
+        *response.status_mut() = self.status();
+        response.extensions_mut().insert(self);
+        response
+    }
+}
+
+impl From<Refusal> for Fault {
+    fn from(refusal: Refusal) -> Self {
+        Self::Refused(refusal)
+    }
+}
+
+impl From<JsonError> for Fault {
+    fn from(error: JsonError) -> Self {
+        match error {
+            JsonError::Syntax { detail } => {
+                Self::Malformed(format!("the constraints are not JSON: {detail}"))
+            }
+            JsonError::Shape(field) => Self::Constraints(vec![field]),
+        }
+    }
+}
+
+/// A problem document (RFC 9457). `type` is `about:blank`: `code` tells the kinds apart.
+#[derive(Debug, Clone, Serialize)]
+pub struct Problem {
+    #[serde(rename = "type")]
+    kind: &'static str,
+    title: &'static str,
+    status: u16,
+    code: &'static str,
+    detail: String,
+    request_id: String,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    errors: Vec<ProblemField>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct ProblemField {
+    pointer: String,
+    detail: String,
+}

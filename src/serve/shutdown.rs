@@ -1,0 +1,71 @@
+//! The end of the service: a signal, a drain, a bound.
+
+use std::{io, time::Duration};
+
+use tokio::{
+    select,
+    signal::unix::{SignalKind, signal},
+    time::timeout,
+};
+use tokio_util::sync::CancellationToken;
+use tracing::{info, warn};
+
+/// Cancels `stop` at the first SIGTERM or SIGINT.
+///
+/// # Errors
+/// When the signals cannot be listened to.
+pub fn on_signal(stop: CancellationToken) -> io::Result<()> {
+    let mut terminate = signal(SignalKind::terminate())?;
+    let mut interrupt = signal(SignalKind::interrupt())?;
+    tokio::spawn(async move {
+        let name = select! {
+            _ = terminate.recv() => "SIGTERM",
+            _ = interrupt.recv() => "SIGINT",
+        };
+        info!(signal = name, "shutting down");
+        stop.cancel();
+    });
+    Ok(())
+}
+
+/// Waits for `serving`, but once `stop` is cancelled no longer than `drain`; `None` when the drain was cut short.
+pub async fn bounded<T>(
+    serving: impl Future<Output = T>,
+    stop: &CancellationToken,
+    drain: Duration,
+) -> Option<T> {
+    let mut serving = std::pin::pin!(serving);
+    select! {
+        outcome = &mut serving => return Some(outcome),
+        () = stop.cancelled() => {}
+    }
+    let outcome = timeout(drain, serving).await.ok();
+    if outcome.is_none() {
+        warn!(
+            seconds = drain.as_secs_f64(),
+            "requests under way were cut off"
+        );
+    }
+    outcome
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn a_drain_ends_when_the_work_does_or_when_time_is_up() {
+        let stop = CancellationToken::new();
+        stop.cancel();
+        let short = Duration::from_millis(20);
+        assert_eq!(bounded(async { 1 }, &stop, short).await, Some(1));
+        assert_eq!(
+            bounded(std::future::pending::<()>(), &stop, short).await,
+            None
+        );
+        assert_eq!(
+            bounded(async { 2 }, &CancellationToken::new(), short).await,
+            Some(2)
+        );
+    }
+}

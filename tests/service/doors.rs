@@ -1,0 +1,212 @@
+//! What goes right: both doors give the same answers.
+
+use darn::contract::v1::{
+    Anchor, Constraints, ScanChunk, darn_client::DarnClient, inpaint_chunk::Part as ChunkPart,
+};
+use reqwest::multipart::{Form, Part};
+use serde_json::Value;
+use tonic::{Code, codegen::tokio_stream};
+
+use crate::harness::Service;
+
+fn chunks(
+    scan: &'static str,
+    constraints: Option<Constraints>,
+) -> tokio_stream::Iter<std::vec::IntoIter<ScanChunk>> {
+    let (head, tail) = scan.as_bytes().split_at(scan.len() / 2);
+    tokio_stream::iter(vec![
+        ScanChunk {
+            constraints,
+            query: None,
+            data: head.into(),
+        },
+        ScanChunk {
+            constraints: None,
+            query: None,
+            data: tail.into(),
+        },
+    ])
+}
+
+#[tokio::test]
+async fn a_scan_comes_back_mended() {
+    let service = Service::start(&[]).await;
+    let response = service.scan("cloth").send().await.unwrap();
+    assert_eq!(response.status(), 200);
+    assert_eq!(response.headers()["content-type"], "model/gltf-binary");
+    assert_eq!(response.headers()["darn-holes-filled"], "1");
+    assert_eq!(response.bytes().await.unwrap(), "glTF cloth");
+    assert_eq!(service.metric("darn_holes_filled_total").await, Some(1.0));
+}
+
+#[tokio::test]
+async fn scan_and_report_come_as_parts_when_asked() {
+    let service = Service::start(&[]).await;
+    let constraints = r#"{"anchors": [{"hole": 2, "uv": [0.5, 0.5], "position": [0, 0, 0]}]}"#;
+    let form = Form::new()
+        .part("scan", Part::bytes(b"cloth".as_slice()))
+        .part(
+            "constraints",
+            Part::text(constraints)
+                .mime_str("application/json")
+                .unwrap(),
+        );
+    let request = service
+        .post("/inpaint")
+        .multipart(form)
+        .header("accept", "multipart/mixed");
+    let response = request.send().await.unwrap();
+    assert_eq!(response.status(), 200);
+    let media = response.headers()["content-type"]
+        .to_str()
+        .unwrap()
+        .to_owned();
+    let boundary = media.strip_prefix("multipart/mixed; boundary=").unwrap();
+    let text = response.text().await.unwrap();
+    let parts: Vec<&str> = text.split(&format!("--{boundary}")).collect();
+    let [_, report, scan, "--\r\n"] = parts[..] else {
+        panic!("{text}")
+    };
+    let report: Value =
+        serde_json::from_str(report.split_once("\r\n\r\n").unwrap().1.trim()).unwrap();
+    assert_eq!(report["notes"][0], "1 anchors");
+    assert!(scan.ends_with("\r\n\r\nglTF cloth\r\n"));
+}
+
+#[tokio::test]
+async fn holes_are_described() {
+    let service = Service::start(&[]).await;
+    let request = service
+        .post("/holes")
+        .header("content-type", "model/gltf+json; charset=utf-8")
+        .body("{}");
+    let report: Value = request.send().await.unwrap().json().await.unwrap();
+    assert_eq!(report["loops"][0]["kind"], "HOLE");
+}
+
+#[tokio::test]
+async fn grpc_shares_the_port() {
+    let service = Service::start(&["--body-limit", "1KiB"]).await;
+    let mut client = DarnClient::connect(service.url("")).await.unwrap();
+
+    let holes = client
+        .find_holes(chunks("cloth", None))
+        .await
+        .unwrap()
+        .into_inner();
+    assert_eq!(holes.loops[0].id, 2);
+
+    let anchor = Anchor {
+        uv: vec![0.5, 0.5],
+        position: vec![0.0; 3],
+        ..Default::default()
+    };
+    let asked = Constraints {
+        anchors: vec![anchor],
+        ..Default::default()
+    };
+    let mut answer = client
+        .inpaint(chunks("cloth", Some(asked)))
+        .await
+        .unwrap()
+        .into_inner();
+    let Some(ChunkPart::Report(report)) = answer.message().await.unwrap().unwrap().part else {
+        panic!("the report comes first");
+    };
+    assert_eq!(report.notes, ["1 anchors"]);
+    let mut scan = Vec::new();
+    while let Some(chunk) = answer.message().await.unwrap() {
+        let Some(ChunkPart::Data(data)) = chunk.part else {
+            panic!("then the scan")
+        };
+        scan.extend_from_slice(&data);
+    }
+    assert_eq!(scan, b"glTF cloth");
+}
+
+#[tokio::test]
+async fn grpc_has_the_same_errors() {
+    let service = Service::start(&["--body-limit", "1KiB"]).await;
+    let mut client = DarnClient::connect(service.url("")).await.unwrap();
+    let wrong = Constraints {
+        up: vec![0.0],
+        ..Default::default()
+    };
+    let large = ScanChunk {
+        data: vec![0; 2048].into(),
+        ..Default::default()
+    };
+    let cases = [
+        (
+            client.inpaint(chunks("cone", None)).await,
+            Code::FailedPrecondition,
+            "not_a_disk",
+        ),
+        (
+            client.inpaint(chunks("truncated", None)).await,
+            Code::InvalidArgument,
+            "truncated",
+        ),
+        (
+            client.inpaint(chunks("panic", None)).await,
+            Code::Internal,
+            "internal",
+        ),
+        (
+            client.inpaint(chunks("cloth", Some(wrong))).await,
+            Code::InvalidArgument,
+            "invalid_constraints",
+        ),
+        (
+            client.inpaint(chunks("", None)).await,
+            Code::InvalidArgument,
+            "empty_body",
+        ),
+        (
+            client.inpaint(tokio_stream::iter([large])).await,
+            Code::ResourceExhausted,
+            "body_too_large",
+        ),
+    ];
+    for (answer, code, word) in cases {
+        let status = answer.expect_err(word);
+        assert_eq!(status.code(), code, "{word}");
+        assert_eq!(status.metadata().get("darn-code").unwrap(), word);
+        let document = status
+            .metadata()
+            .get_bin("darn-problem-bin")
+            .unwrap()
+            .to_bytes()
+            .unwrap();
+        let document: Value = serde_json::from_slice(&document).unwrap();
+        assert_eq!(document["code"], word);
+    }
+    let later = client
+        .optimize_anchor(chunks("cloth", None))
+        .await
+        .unwrap_err();
+    assert_eq!(later.code(), Code::Unimplemented);
+}
+
+#[tokio::test]
+async fn a_health_check_asks_for_readiness() {
+    let service = Service::start(&[]).await;
+    let ask = |address| {
+        let patience = std::time::Duration::from_secs(5);
+        tokio::task::spawn_blocking(move || darn::serve::healthcheck(address, patience))
+    };
+    ask(service.address).await.unwrap().unwrap();
+    service.stop.cancel();
+    service.ended.await.unwrap().unwrap();
+    assert!(ask(service.address).await.unwrap().is_err());
+}
+
+#[tokio::test]
+async fn grpc_may_have_its_own_port() {
+    let service = Service::start(&["--grpc-listen", "127.0.0.1:0"]).await;
+    let grpc = service.grpc.expect("a port of its own");
+    let mut client = DarnClient::connect(format!("http://{grpc}")).await.unwrap();
+    assert!(client.find_holes(chunks("cloth", None)).await.is_ok());
+    let mut shared = DarnClient::connect(service.url("")).await.unwrap();
+    assert!(shared.find_holes(chunks("cloth", None)).await.is_err());
+}

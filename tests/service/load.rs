@@ -1,0 +1,102 @@
+//! Queue, deadline, callers who leave, shutdown.
+
+use std::time::{Duration, Instant};
+
+use crate::harness::{Service, problem};
+
+#[tokio::test]
+async fn a_full_queue_refuses_with_an_estimate() {
+    let service = Service::start(&["--workers", "1", "--queue", "1"]).await;
+    let running = tokio::spawn(service.scan("hold 1").send());
+    service.fake.wait_for("hold 1").await;
+    let waiting = tokio::spawn(service.scan("hold 2").send());
+    until(|| async { service.metric("darn_jobs{state=\"waiting\"}").await == Some(1.0) }).await;
+
+    let refused = service.scan("cloth").send().await.unwrap();
+    let retry_after: u64 = refused.headers()["retry-after"]
+        .to_str()
+        .unwrap()
+        .parse()
+        .unwrap();
+    assert!((1..=120).contains(&retry_after));
+    insta::assert_snapshot!("queue_full", format!("{:#}", problem(refused).await));
+    assert_eq!(service.get("/livez").send().await.unwrap().status(), 200);
+
+    service.fake.release();
+    assert_eq!(running.await.unwrap().unwrap().status(), 200);
+    assert_eq!(waiting.await.unwrap().unwrap().status(), 200);
+    assert_eq!(service.scan("cloth").send().await.unwrap().status(), 200);
+}
+
+#[tokio::test]
+async fn the_deadline_covers_waiting_and_running() {
+    let service = Service::start(&["--workers", "1", "--deadline", "300ms"]).await;
+    let running = tokio::spawn(service.scan("hold").send());
+    service.fake.wait_for("hold").await;
+    let begun = Instant::now();
+    let waited = service.scan("waits").send().await.unwrap();
+    assert!(
+        begun.elapsed() < Duration::from_secs(10),
+        "the deadline waited for the running job"
+    );
+    insta::assert_snapshot!("deadline", format!("{:#}", problem(waited).await));
+    assert_eq!(running.await.unwrap().unwrap().status(), 504);
+
+    service.fake.release();
+    assert_eq!(service.scan("cloth").send().await.unwrap().status(), 200);
+    assert!(
+        !service.fake.seen().contains(&"waits".to_owned()),
+        "an expired job ran"
+    );
+}
+
+#[tokio::test]
+async fn a_caller_who_left_costs_no_work() {
+    let service = Service::start(&["--workers", "1"]).await;
+    let running = tokio::spawn(service.scan("hold").send());
+    service.fake.wait_for("hold").await;
+    let leaving = tokio::spawn(service.scan("leaves").send());
+    until(|| async { service.metric("darn_jobs{state=\"waiting\"}").await == Some(1.0) }).await;
+    leaving.abort();
+    // The place in the queue is given up when the server sees the connection close; nothing tells a test of it but time.
+    tokio::time::sleep(Duration::from_millis(200)).await;
+    service.fake.release();
+    assert_eq!(running.await.unwrap().unwrap().status(), 200);
+    assert_eq!(service.scan("cloth").send().await.unwrap().status(), 200);
+    assert!(!service.fake.seen().contains(&"leaves".to_owned()));
+    assert_eq!(
+        service.metric("darn_jobs_total{end=\"skipped\"}").await,
+        Some(1.0)
+    );
+}
+
+#[tokio::test]
+async fn a_shutdown_lets_running_work_end() {
+    let service = Service::start(&["--workers", "1"]).await;
+    let running = tokio::spawn(service.scan("hold").send());
+    service.fake.wait_for("hold").await;
+    service.stop.cancel();
+    service.fake.release();
+    assert_eq!(running.await.unwrap().unwrap().status(), 200);
+    service.ended.await.unwrap().unwrap();
+}
+
+#[tokio::test]
+async fn a_shutdown_is_bounded() {
+    let service = Service::start(&["--workers", "1", "--drain", "100ms"]).await;
+    let running = tokio::spawn(service.scan("hold").send());
+    service.fake.wait_for("hold").await;
+    service.stop.cancel();
+    let ended = tokio::time::timeout(Duration::from_secs(10), service.ended).await;
+    ended.expect("the drain was not bounded").unwrap().unwrap();
+    service.fake.release();
+    running.abort();
+}
+
+async fn until<F: Future<Output = bool>>(holds: impl Fn() -> F) {
+    let patience = Instant::now() + Duration::from_secs(20);
+    while !holds().await {
+        assert!(Instant::now() < patience, "it never came about");
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+}

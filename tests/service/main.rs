@@ -1,0 +1,7 @@
+//! The service through its real router on a real socket, mending replaced by a fake that fails on demand.
+
+mod doors;
+mod faults;
+mod harness;
+mod load;
+mod openapi;

@@ -1,0 +1,56 @@
+//! The committed OpenAPI document is the one served.
+
+use serde_json::Value;
+
+use crate::harness::Service;
+
+const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/proto/openapi.json");
+
+#[tokio::test]
+async fn the_committed_document_is_the_served_one() {
+    let service = Service::start(&[]).await;
+    let served: Value = service
+        .get("/openapi.json")
+        .send()
+        .await
+        .unwrap()
+        .json()
+        .await
+        .unwrap();
+    let text = serde_json::to_string_pretty(&served).unwrap() + "\n";
+    if std::env::var_os("DARN_BLESS").is_some() {
+        std::fs::write(COMMITTED, &text).unwrap();
+    }
+    let committed = std::fs::read_to_string(COMMITTED).unwrap_or_default();
+    assert!(
+        committed == text,
+        "proto/openapi.json has drifted; `DARN_BLESS=1 cargo test --test service` rewrites it"
+    );
+}
+
+#[test]
+fn every_reference_has_its_schema() {
+    let document = darn::serve::openapi::document();
+    let schemas = document["components"]["schemas"].as_object().unwrap();
+    let mut open = vec![&document];
+    while let Some(value) = open.pop() {
+        match value {
+            Value::Object(fields) => {
+                if let Some(Value::String(reference)) = fields.get("$ref") {
+                    let name = reference.strip_prefix("#/components/schemas/").unwrap();
+                    assert!(schemas.contains_key(name), "{name}");
+                }
+                open.extend(fields.values());
+            }
+            Value::Array(items) => open.extend(items),
+            _ => {}
+        }
+    }
+    assert!(schemas["HoleReport"]["properties"]["chart"]["$ref"].is_string());
+    assert!(
+        !schemas["Report"]["description"]
+            .as_str()
+            .unwrap()
+            .is_empty()
+    );
+}
