@@ -1,0 +1,80 @@
+//! `darn healthcheck`: asks a running service whether it is ready, for containers that have no curl.
+
+use super::failure::{Failure, OrFail};
+use std::net::SocketAddr;
+use std::time::Duration;
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Where the service listens; 0.0.0.0 is asked on the loopback
+    #[arg(
+        long,
+        env = "DARN_LISTEN",
+        value_name = "ADDRESS",
+        default_value = "127.0.0.1:8080"
+    )]
+    listen: SocketAddr,
+    /// Seconds to wait for an answer
+    #[arg(long, value_name = "SECONDS", default_value_t = 2, value_parser = clap::value_parser!(u64).range(1..=60))]
+    patience: u64,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    darn::serve::healthcheck(args.listen, Duration::from_secs(args.patience))
+        .or_fail("see the service ready")?;
+    println!("{}: ready", args.listen);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::{Read, Write};
+    use std::net::TcpListener;
+
+    /// Asks somebody who answers with `answer`.
+    fn asked(answer: &'static str) -> Result<(), Failure> {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+        let listen = listener.local_addr().expect("an address");
+        let server = std::thread::spawn(move || {
+            let (mut stream, _) = listener.accept().expect("a client");
+            // Whether the client reads to the end is its own affair.
+            let _ = stream.read(&mut [0; 512]);
+            let _ = stream.write_all(answer.as_bytes());
+        });
+        let outcome = run(&Args {
+            listen,
+            patience: 2,
+        });
+        server.join().expect("the server ended");
+        outcome
+    }
+
+    #[test]
+    fn ready_is_only_a_200() {
+        assert!(asked("HTTP/1.1 200 OK\r\ncontent-length: 0\r\n\r\n").is_ok());
+        for other in [
+            "HTTP/1.1 503 Service Unavailable\r\n\r\n",
+            "SSH-2.0-OpenSSH\r\n",
+            "",
+        ] {
+            assert_eq!(asked(other).expect_err(other).code(), 1);
+        }
+    }
+
+    #[test]
+    fn nobody_there_is_a_failure() {
+        let listen = TcpListener::bind("127.0.0.1:0")
+            .and_then(|l| l.local_addr())
+            .expect("a free port");
+        assert_eq!(
+            run(&Args {
+                listen,
+                patience: 1
+            })
+            .expect_err("nobody listens")
+            .code(),
+            1
+        );
+    }
+}

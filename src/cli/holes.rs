@@ -1,0 +1,97 @@
+//! `darn holes`: the boundary loops of a scan.
+
+use super::failure::{Failure, OrFail};
+use super::files;
+use darn::contract::v1::{HolesReport, Loop, LoopKind};
+use darn::scan::{Limits, Scan};
+use std::path::PathBuf;
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The scan: GLB, or glTF with data URIs
+    scan: PathBuf,
+    /// Print the report that POST /holes answers with
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let bytes = files::read(&args.scan)?;
+    let name = args.scan.display();
+    let scan = Scan::read(&bytes, &Limits::default()).or_fail(format!("read {name}"))?;
+    let report = darn::mend::find_holes(&scan, &darn::mend::Limits::default())
+        .or_fail(format!("find holes in {name}"))?;
+    if args.json {
+        println!(
+            "{}",
+            serde_json::to_string_pretty(&report).or_fail("write the report")?
+        );
+    } else {
+        print!("{}", table(&report));
+    }
+    Ok(())
+}
+
+fn table(report: &HolesReport) -> String {
+    let mut text = format!(
+        "{:>4}  {:<14} {:>9} {:>12} {:>9}  centroid\n",
+        "id", "kind", "vertices", "length", "turning"
+    );
+    for rim in &report.loops {
+        text.push_str(&line(rim));
+    }
+    for note in &report.notes {
+        text.push_str(&format!("note: {note}\n"));
+    }
+    text
+}
+
+fn line(rim: &Loop) -> String {
+    let centroid: Vec<String> = rim.centroid.iter().map(|c| format!("{c:.4}")).collect();
+    format!(
+        "{:>4}  {:<14} {:>9} {:>12.4} {:>9.2}  {}\n",
+        rim.id,
+        kind(rim.kind()),
+        rim.vertices,
+        rim.length,
+        rim.turning,
+        centroid.join(" ")
+    )
+}
+
+/// What a loop is, for a person.
+pub fn kind(kind: LoopKind) -> &'static str {
+    match kind {
+        LoopKind::Hole => "hole",
+        LoopKind::OuterBoundary => "outer boundary",
+        LoopKind::TubeEnd => "end of a tube",
+        LoopKind::Unspecified => "unknown",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_loop_and_note_has_its_line() {
+        let rim = Loop {
+            id: 7,
+            kind: LoopKind::Hole.into(),
+            vertices: 12,
+            length: 3.25,
+            centroid: vec![0.0, 1.0, 2.0],
+            ..Loop::default()
+        };
+        let report = HolesReport {
+            loops: vec![rim],
+            notes: vec!["a bow-tie".into()],
+            ..HolesReport::default()
+        };
+        let text = table(&report);
+        assert_eq!(text.lines().count(), 3);
+        assert!(
+            text.contains("hole") && text.contains("3.2500") && text.ends_with("note: a bow-tie\n")
+        );
+    }
+}

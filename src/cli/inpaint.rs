@@ -1,0 +1,138 @@
+//! `darn inpaint`: fill the holes of a scan.
+
+use super::failure::{Failure, OrFail};
+use super::files;
+use super::holes::kind;
+use super::network::NetworkArgs;
+use super::progress::Progress;
+use darn::contract::v1::Report;
+use darn::contract::{self, Constraints, FieldError};
+use darn::scan::{Limits, Scan};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The scan: GLB, or glTF with data URIs
+    scan: PathBuf,
+    /// Where the mended scan goes, in the container the scan came in
+    #[arg(short, long)]
+    output: PathBuf,
+    /// What the new cloth is to keep to, as JSON
+    #[arg(short, long)]
+    constraints: Option<PathBuf>,
+    /// Where the report goes, as JSON
+    #[arg(long)]
+    report: Option<PathBuf>,
+    #[command(flatten)]
+    network: NetworkArgs,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let name = args.scan.display();
+    let progress = Progress::staged("darn");
+    progress.stage("reading");
+    let constraints = match &args.constraints {
+        Some(path) => constraints(path)?,
+        None => Constraints::default(),
+    };
+    let bytes = files::read(&args.scan)?;
+    let started = Instant::now();
+    let scan = Scan::read(&bytes, &Limits::default()).or_fail(format!("read {name}"))?;
+    let read = started.elapsed();
+    progress.stage("loading weights");
+    let mender = args.network.mender()?;
+    progress.stage("mending");
+    let mended = darn::mend::mend(&scan, &constraints, &mender)
+        .or_fail(format!("mend {name}"))?
+        .with_read_time(read);
+    progress.stage("writing");
+    files::write(&args.output, &mended.bytes)?;
+    if let Some(path) = &args.report {
+        let mut json = serde_json::to_vec_pretty(&mended.report).or_fail("write the report")?;
+        json.push(b'\n');
+        files::write(path, &json)?;
+    }
+    drop(progress);
+    print!("{}", summary(&mended.report));
+    Ok(())
+}
+
+/// The constraints in a file; what is wrong with them is a matter of usage.
+fn constraints(path: &Path) -> Result<Constraints, Failure> {
+    let name = path.display();
+    let text = files::read(path)?;
+    let message =
+        contract::from_json(&text).map_err(|error| Failure::Usage(format!("{name}: {error}")))?;
+    Constraints::check(&message).map_err(|errors| {
+        let all: Vec<String> = errors.iter().map(FieldError::to_string).collect();
+        Failure::Usage(format!("{name}: {}", all.join("; ")))
+    })
+}
+
+/// One line a loop: what was filled with what, and what was left.
+fn summary(report: &Report) -> String {
+    let mut text = String::new();
+    for hole in &report.holes {
+        let patch = hole.patch.clone().unwrap_or_default();
+        let crossings = match patch.self_intersections {
+            0 => String::new(),
+            n => format!(", {n} self-intersections"),
+        };
+        text.push_str(&format!(
+            "hole {}: rim of {} vertices, length {:.4}; patched with {} faces, stretch {:.3}{crossings}\n",
+            hole.id, hole.vertices, hole.length, patch.faces, patch.stretch_mean
+        ));
+    }
+    for left in &report.skipped {
+        text.push_str(&format!(
+            "left loop {} ({}): {}\n",
+            left.id,
+            kind(left.kind()),
+            left.reason
+        ));
+    }
+    for note in report
+        .notes
+        .iter()
+        .chain(report.holes.iter().flat_map(|hole| &hole.notes))
+    {
+        text.push_str(&format!("note: {note}\n"));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use darn::contract::v1::{HoleReport, Skipped};
+
+    #[test]
+    fn every_loop_has_its_line() {
+        let report = Report {
+            holes: vec![HoleReport {
+                id: 1,
+                ..HoleReport::default()
+            }],
+            skipped: vec![Skipped {
+                id: 0,
+                reason: "it is the cloth's own edge".into(),
+                ..Skipped::default()
+            }],
+            ..Report::default()
+        };
+        let text = summary(&report);
+        assert!(
+            text.starts_with("hole 1: ") && text.contains("left loop 0"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn wrong_constraints_are_a_matter_of_usage() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("c.json");
+        std::fs::write(&path, r#"{"hole": []}"#).expect("written");
+        assert_eq!(constraints(&path).unwrap_err().code(), 64);
+    }
+}

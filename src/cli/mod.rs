@@ -1,0 +1,113 @@
+//! The command line: one file a command; each reads files, calls the library and writes files.
+//! May use every room of the library; exit codes are 0 done, 1 failed, 64 wrong usage or settings.
+//! No geometry, no HTTP routes, no training: a command that grows a second idea wants a room in the library.
+
+mod bridge;
+mod failure;
+mod files;
+mod healthcheck;
+mod holes;
+mod inpaint;
+mod network;
+mod openapi;
+mod progress;
+mod render;
+mod scarffolds;
+mod serve;
+mod train;
+
+use clap::{Parser, Subcommand};
+use darn::serve::{LogFormat, ServeArgs, start_logging};
+use failure::Failure;
+use std::io::IsTerminal;
+use std::process::ExitCode;
+
+/// Wrong usage or settings (`EX_USAGE` of BSD's sysexits).
+const USAGE: u8 = 64;
+
+/// Mends holes in scanned fabric.
+#[derive(Debug, Parser)]
+#[command(name = "darn", version, about, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Serve HTTP: POST a scan to /inpaint, get it back mended
+    Serve(ServeArgs),
+    /// Fill the holes of a scan
+    Inpaint(inpaint::Args),
+    /// List the boundary loops of a scan: its holes, its border, the ends of its sleeves
+    Holes(holes::Args),
+    /// Draw a shaded picture of a scan; reconstructed cloth is tinted
+    Render(render::Args),
+    /// Ask a running service whether it is ready: exit 0 if so, 1 if not
+    Healthcheck(healthcheck::Args),
+    /// Simulate sheets of cloth to train on
+    Scarffolds(scarffolds::Args),
+    /// Train a network on simulated sheets
+    Train(train::Args),
+    /// Print the service's OpenAPI document
+    Openapi,
+}
+
+/// Runs the command that the process was started with.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version come as errors too, but are what was asked for.
+            let code = if error.use_stderr() { USAGE } else { 0 };
+            return match error.print() {
+                Ok(()) => ExitCode::from(code),
+                Err(_) => ExitCode::FAILURE,
+            };
+        }
+    };
+    match run(cli.command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("darn: {failure}");
+            ExitCode::from(failure.code())
+        }
+    }
+}
+
+fn run(command: Command) -> Result<(), Failure> {
+    // The service starts logging by its own settings.
+    if !matches!(command, Command::Serve(_)) {
+        start_logging(usual_log(), LogFormat::Text).map_err(Failure::Usage)?;
+    }
+    match command {
+        Command::Serve(settings) => serve::run(&settings),
+        Command::Inpaint(args) => inpaint::run(&args),
+        Command::Holes(args) => holes::run(&args),
+        Command::Render(args) => render::run(&args),
+        Command::Healthcheck(args) => healthcheck::run(&args),
+        Command::Scarffolds(args) => scarffolds::run(&args),
+        Command::Train(args) => train::run(&args),
+        Command::Openapi => openapi::run(),
+    }
+}
+
+/// What a command logs: progress where no terminal shows a bar, warnings everywhere.
+fn usual_log() -> &'static str {
+    if std::io::stderr().is_terminal() {
+        "warn"
+    } else {
+        "warn,darn=info"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_sound() {
+        Cli::command().debug_assert();
+    }
+}

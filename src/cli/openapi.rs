@@ -1,0 +1,14 @@
+//! `darn openapi`: the service's OpenAPI document, as `/openapi.json` serves it and `proto/openapi.json` keeps it.
+
+use super::failure::{Failure, OrFail};
+use std::io::Write;
+
+pub fn run() -> Result<(), Failure> {
+    let mut text = serde_json::to_string_pretty(&darn::serve::openapi::document())
+        .or_fail("write the document")?;
+    text.push('\n');
+    // Not print!, which panics when the reader, say `head`, has gone.
+    std::io::stdout()
+        .write_all(text.as_bytes())
+        .or_fail("write the document")
+}

@@ -1,0 +1,130 @@
+//! `darn render`: a picture of a scan, reconstructed cloth tinted.
+
+use super::failure::{Failure, OrFail};
+use super::files;
+use darn::mesh::{Vec3, weld};
+use darn::render::{Aim, CLOTH, Framing, Lines, MAX_SIDE, MENDED, View, picture};
+use darn::scan::{Limits, Scan};
+use image::ImageFormat;
+use std::io::Cursor;
+use std::path::PathBuf;
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The scan: GLB, or glTF with data URIs
+    scan: PathBuf,
+    /// Where the picture goes, as PNG
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Width and height in pixels
+    #[arg(long, value_name = "WxH", default_value = "1200x900", value_parser = size)]
+    size: [u32; 2],
+    /// Camera's azimuth about +y and elevation, in degrees; by default the cloth's broad side
+    #[arg(long, value_name = "AZIMUTH,ELEVATION", value_parser = numbers::<2>, allow_hyphen_values = true)]
+    view: Option<[f64; 2]>,
+    /// Look at a ball only: its centre and radius
+    #[arg(long, value_name = "X,Y,Z,RADIUS", value_parser = numbers::<4>, allow_hyphen_values = true)]
+    focus: Option<[f64; 4]>,
+    /// Draw every edge, not only boundaries
+    #[arg(long)]
+    wireframe: bool,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let bytes = files::read(&args.scan)?;
+    let scan =
+        Scan::read(&bytes, &Limits::default()).or_fail(format!("read {}", args.scan.display()))?;
+    let welded = weld::weld(&scan.surface);
+    let tints: Vec<[u8; 3]> = welded
+        .face_of
+        .iter()
+        .map(|&face| tint(&scan, face))
+        .collect();
+    let image = picture(&welded.mesh, &tints, &args.framed());
+    let mut png = Cursor::new(Vec::new());
+    image
+        .write_to(&mut png, ImageFormat::Png)
+        .or_fail("encode the picture")?;
+    files::write(&args.output, &png.into_inner())
+}
+
+impl Args {
+    fn framed(&self) -> View {
+        View {
+            size: self.size,
+            aim: self
+                .view
+                .map_or(Aim::Auto, |[azimuth, elevation]| Aim::Angles {
+                    azimuth,
+                    elevation,
+                }),
+            framing: self
+                .focus
+                .map_or(Framing::Whole, |[x, y, z, radius]| Framing::Focus {
+                    centre: Vec3::new(x, y, z),
+                    radius,
+                }),
+            lines: if self.wireframe {
+                Lines::Wireframe
+            } else {
+                Lines::Rims
+            },
+        }
+    }
+}
+
+/// The colour of a face of the scan's surface: evidence and reconstruction are told apart.
+fn tint(scan: &Scan, face: u32) -> [u8; 3] {
+    let part = scan
+        .part_of_face(face)
+        .and_then(|part| scan.parts.get(part));
+    if part.is_some_and(|part| part.reconstructed) {
+        MENDED
+    } else {
+        CLOTH
+    }
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let (width, height) = text
+        .split_once('x')
+        .ok_or("expected WIDTHxHEIGHT, such as 1200x900")?;
+    let side = |side: &str| match side.parse() {
+        Ok(pixels) if (1..=MAX_SIDE).contains(&pixels) => Ok(pixels),
+        _ => Err(format!(
+            "{side:?} is not a whole number from 1 to {MAX_SIDE}"
+        )),
+    };
+    Ok([side(width)?, side(height)?])
+}
+
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let all: Result<Vec<f64>, _> = text
+        .split(',')
+        .map(|part| part.trim().parse::<f64>())
+        .collect();
+    let all = all.ok().filter(|all| all.iter().all(|x| x.is_finite()));
+    all.and_then(|all| all.try_into().ok())
+        .ok_or_else(|| format!("expected {N} numbers with commas between them"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_read_or_refused() {
+        assert_eq!(size("1200x900"), Ok([1200, 900]));
+        for wrong in ["1200", "0x9", "axb", "9x99999999", "-1x4"] {
+            assert!(size(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn numbers_are_counted() {
+        assert_eq!(numbers::<2>("-30, 45.5"), Ok([-30.0, 45.5]));
+        for wrong in ["1", "1,2,3", "1,x", "nan,1", "inf,0"] {
+            assert!(numbers::<2>(wrong).is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,19 @@
+//! `darn serve`: the service.
+
+use super::bridge::Bridge;
+use super::failure::{Failure, OrFail};
+use super::network;
+use darn::scan::Limits;
+use darn::serve::{ServeArgs, start_logging};
+use std::sync::Arc;
+
+pub fn run(settings: &ServeArgs) -> Result<(), Failure> {
+    start_logging(&settings.log, settings.log_format)
+        .map_err(|error| Failure::Usage(format!("--log {}: {error}", settings.log)))?;
+    let mender = network::mender(settings.weights.as_deref(), settings.backend)?;
+    let limits = Limits {
+        max_faces: settings.max_faces,
+        ..Limits::default()
+    };
+    darn::serve::run(settings, Arc::new(Bridge { mender, limits })).or_fail("serve")
+}

@@ -1,0 +1,165 @@
+//! `darn train`: train a network on simulated sheets.
+
+use super::failure::{Failure, OrFail};
+use darn::net::UnetConfig;
+use darn::train::{Progress, Score, Start, TrainOptions};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::IsTerminal;
+use std::path::PathBuf;
+
+/// Steps of the progress bar.
+const BAR: u64 = 1000;
+/// Log lines of a whole run, besides those with scores.
+const LINES: f64 = 50.0;
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Folder of sheets to learn from, as `darn scarffolds` makes it
+    #[arg(long)]
+    sheets: PathBuf,
+    /// Folder of sheets to be measured on; made with another seed
+    #[arg(long)]
+    held_out: PathBuf,
+    /// Folder for checkpoints, curves and weights
+    #[arg(long)]
+    out: PathBuf,
+    /// How long, in minutes; the learning rate falls to zero at the end
+    #[arg(long)]
+    minutes: f64,
+    /// Name on the model card
+    #[arg(long, default_value = "standard")]
+    name: String,
+    /// Channels at the first scale
+    #[arg(long, default_value_t = UnetConfig::default().width)]
+    width: usize,
+    /// Samples a step
+    #[arg(long, default_value_t = TrainOptions::default().batch)]
+    batch: usize,
+    /// Highest learning rate
+    #[arg(long, default_value_t = TrainOptions::default().rate)]
+    rate: f64,
+    /// Minutes between checkpoints, scores and exported weights
+    #[arg(long, default_value_t = TrainOptions::default().every)]
+    every: f64,
+    /// Seed of weights and samples
+    #[arg(long, default_value_t = TrainOptions::default().seed)]
+    seed: u64,
+    /// Threads that make samples
+    #[arg(long, default_value_t = TrainOptions::default().sample_threads)]
+    sample_threads: usize,
+    /// Go on from the checkpoint in the output folder
+    #[arg(long)]
+    resume: bool,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let mut told = Told::new();
+    let summary =
+        darn::train::run(&args.options(), &mut |progress| told.step(progress)).or_fail("train")?;
+    drop(told);
+    println!(
+        "{} steps in {:.1} minutes; weights in {}",
+        summary.steps,
+        summary.minutes,
+        summary.weights.display()
+    );
+    println!("network     {}", line(&summary.score));
+    println!("input fill  {}", line(&summary.fill));
+    Ok(())
+}
+
+impl Args {
+    fn options(&self) -> TrainOptions {
+        TrainOptions {
+            name: self.name.clone(),
+            sheets: self.sheets.clone(),
+            held_out: self.held_out.clone(),
+            out: self.out.clone(),
+            resume: if self.resume {
+                Start::Resume
+            } else {
+                Start::Fresh
+            },
+            network: UnetConfig {
+                width: self.width,
+                ..UnetConfig::default()
+            },
+            batch: self.batch,
+            rate: self.rate,
+            minutes: self.minutes,
+            every: self.every,
+            seed: self.seed,
+            sample_threads: self.sample_threads,
+            ..TrainOptions::default()
+        }
+    }
+}
+
+/// A bar on a terminal, log lines elsewhere; scores always get a line.
+struct Told {
+    bar: Option<ProgressBar>,
+    /// Log lines so far.
+    lines: f64,
+}
+
+impl Told {
+    fn new() -> Self {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let bar = ProgressBar::new(BAR).with_prefix("train");
+            if let Ok(style) =
+                ProgressStyle::with_template("{prefix} [{bar:40}] {percent} % {msg} {eta}")
+            {
+                bar.set_style(style.progress_chars("=> "));
+            }
+            bar
+        });
+        Self { bar, lines: 0.0 }
+    }
+
+    fn step(&mut self, now: &Progress) {
+        let [total, data, gradient, stretch] = now.loss;
+        if let Some(bar) = &self.bar {
+            bar.set_position((now.share * BAR as f64) as u64);
+            bar.set_message(format!("step {} loss {total:.4}", now.step));
+        } else if now.share * LINES >= self.lines {
+            self.lines = (now.share * LINES).floor() + 1.0;
+            tracing::info!(
+                step = now.step,
+                minutes = now.minutes,
+                total,
+                data,
+                gradient,
+                stretch,
+                norm = now.norm,
+                "training"
+            );
+        }
+        if let Some([network, fill]) = &now.scores {
+            let text = format!(
+                "step {}: network {}; input fill {}",
+                now.step,
+                line(network),
+                line(fill)
+            );
+            match &self.bar {
+                Some(bar) => bar.println(text),
+                None => tracing::info!("{text}"),
+            }
+        }
+    }
+}
+
+impl Drop for Told {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+fn line(score: &Score) -> String {
+    format!(
+        "rmse {:.2} cells (median {:.2}), normals {:.1} degrees, spacing {:.3}, area {:.3}",
+        score.rmse, score.rmse_median, score.normal, score.spacing, score.area
+    )
+}

@@ -1,0 +1,11 @@
+//! The `darn` binary: one command line over the library.
+
+#![forbid(unsafe_code)]
+
+mod cli;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    cli::main()
+}
