@@ -1,0 +1,138 @@
+//! The binary as a user meets it: `darn serve` on a real socket, and the commands beside it.
+
+use std::io::{BufRead, BufReader};
+use std::net::SocketAddr;
+use std::process::{Child, Command, Stdio};
+
+const EXAMPLE: &[u8] = include_bytes!("../examples/scarf_hole.glb");
+
+fn darn() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_darn"))
+}
+
+/// A running `darn serve`; killed when dropped.
+struct Service {
+    child: Child,
+    address: SocketAddr,
+}
+
+impl Service {
+    /// Starts on a free port and waits until the log says which.
+    fn start() -> Service {
+        let mut child = darn()
+            .args(["serve", "--listen", "127.0.0.1:0"])
+            .stderr(Stdio::piped())
+            .stdout(Stdio::null())
+            .spawn()
+            .expect("darn starts");
+        let mut lines = BufReader::new(child.stderr.take().expect("piped")).lines();
+        let address = lines
+            .by_ref()
+            .map_while(Result::ok)
+            .find_map(|line| {
+                line.split("address=")
+                    .nth(1)?
+                    .split_whitespace()
+                    .next()?
+                    .parse()
+                    .ok()
+            })
+            .expect("the log names the address");
+        // Whoever reads no more blocks the writer.
+        std::thread::spawn(move || lines.for_each(drop));
+        Service { child, address }
+    }
+
+    fn url(&self, path: &str) -> String {
+        format!("http://{}{path}", self.address)
+    }
+}
+
+impl Drop for Service {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+#[tokio::test]
+async fn the_service_answers_as_the_command_does_and_stops_when_told() {
+    let mut service = Service::start();
+    let client = reqwest::Client::new();
+    for _ in 0..600 {
+        if client
+            .get(service.url("/readyz"))
+            .send()
+            .await
+            .is_ok_and(|r| r.status() == 200)
+        {
+            break;
+        }
+        tokio::time::sleep(std::time::Duration::from_millis(50)).await;
+    }
+    let answer = client
+        .post(service.url("/inpaint"))
+        .header("content-type", "model/gltf-binary")
+        .body(EXAMPLE)
+        .send()
+        .await
+        .expect("an answer");
+    assert_eq!(answer.status(), 200);
+    assert_eq!(answer.headers()["content-type"], "model/gltf-binary");
+    let over_http = answer.bytes().await.expect("a body");
+
+    let folder = tempfile::tempdir().expect("a folder");
+    let (scan, out) = (folder.path().join("in.glb"), folder.path().join("out.glb"));
+    std::fs::write(&scan, EXAMPLE).expect("written");
+    let status = darn()
+        .arg("inpaint")
+        .arg(&scan)
+        .arg("-o")
+        .arg(&out)
+        .status()
+        .expect("darn runs");
+    assert!(status.success());
+    assert!(
+        over_http == std::fs::read(&out).expect("a result"),
+        "HTTP and command differ"
+    );
+
+    let garbage = client
+        .post(service.url("/inpaint"))
+        .header("content-type", "model/gltf-binary")
+        .body("glTF, but not really")
+        .send()
+        .await
+        .expect("an answer");
+    assert_eq!(garbage.status(), 400);
+    assert_eq!(
+        garbage.headers()["content-type"],
+        "application/problem+json"
+    );
+
+    let healthy = darn()
+        .args(["healthcheck", "--listen", &service.address.to_string()])
+        .status();
+    assert!(healthy.expect("darn runs").success());
+    let stopped = Command::new("kill")
+        .arg(service.child.id().to_string())
+        .status();
+    assert!(stopped.expect("kill runs").success());
+    assert!(
+        service.child.wait().expect("it ends").success(),
+        "SIGTERM is a clean end"
+    );
+}
+
+#[test]
+fn wrong_usage_is_64_and_a_broken_scan_is_1_with_one_line_that_says_why() {
+    let usage = darn().args(["inpaint"]).output().expect("darn runs");
+    assert_eq!(usage.status.code(), Some(64));
+    let missing = darn()
+        .args(["holes", "/nowhere/scan.glb"])
+        .output()
+        .expect("darn runs");
+    assert_eq!(missing.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&missing.stderr).into_owned();
+    assert!(said.contains("/nowhere/scan.glb"), "{said}");
+}

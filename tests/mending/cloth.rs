@@ -1,0 +1,129 @@
+//! Scans with holes, and what to know about a mended one.
+
+use std::sync::OnceLock;
+
+use darn::contract::Constraints;
+use darn::mend::{Limits, MendError, Mended, Mender, mend};
+use darn::mesh::curvature::{face_areas, vertex_normals};
+use darn::mesh::loops::{BoundaryLoop, boundary_loops};
+use darn::mesh::topology::Topology;
+use darn::mesh::weld::{Welded, weld};
+use darn::mesh::{TriMesh, Vec2, Vec3};
+use darn::net::{BackendKind, Network};
+use darn::scan::export::{Fresh, glb};
+use darn::scan::{self, Scan};
+use darn::scarffolds::scanned::{Hole, Scanned, scanned};
+use darn::scarffolds::sheets::{self, Sheet};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// The weights that ship.
+pub const WEIGHTS: &[u8] = include_bytes!("../../weights/standard.safetensors");
+
+/// A hole in the middle, a quarter of the sheet wide.
+pub const ROUND: Hole = Hole::Circle {
+    centre: Vec2::new(0.5, 0.48),
+    radius: 0.13,
+};
+
+/// The mender, loaded once for all tests.
+pub fn mender() -> &'static Mender {
+    static MENDER: OnceLock<Mender> = OnceLock::new();
+    MENDER.get_or_init(|| Mender {
+        network: Network::load(WEIGHTS, BackendKind::Flex).expect("the shipped weights load"),
+        limits: Limits::default(),
+    })
+}
+
+/// Simulated sheets, made once for all tests.
+pub fn sheet(index: usize) -> &'static Sheet {
+    static SHEETS: OnceLock<Vec<Sheet>> = OnceLock::new();
+    let make = || (0..3).map(|k| sheets::make(20, k).expect("a sheet").0);
+    &SHEETS.get_or_init(|| make().collect())[index]
+}
+
+/// A sheet that `place` lays over (u, v) in the unit square.
+pub fn laid(place: impl Fn(f32, f32) -> [f32; 3]) -> Sheet {
+    let at = |k: usize| place((k % 51) as f32 / 50.0, (k / 51) as f32 / 50.0);
+    Sheet {
+        positions: (0..51 * 51).map(at).collect(),
+    }
+}
+
+/// A sheet as a scan of about 45² vertices with a hole.
+pub fn holed(sheet: &Sheet, hole: &Hole) -> Scanned {
+    scanned(sheet, 45, hole, &mut ChaCha8Rng::seed_from_u64(5))
+}
+
+/// A mesh as GLB; texture coordinates may be left empty.
+pub fn packed(mesh: &TriMesh, texcoords: &[[f32; 2]]) -> Vec<u8> {
+    let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| p.cast().into()).collect();
+    let normals = vertex_normals(mesh);
+    let normals: Vec<[f32; 3]> = normals.iter().map(|n| n.cast().into()).collect();
+    let fresh = Fresh {
+        name: "scarf",
+        positions: &positions,
+        normals: &normals,
+        texcoords,
+        faces: &mesh.faces,
+    };
+    glb(&fresh).expect("a small file")
+}
+
+pub fn read(bytes: &[u8]) -> Scan {
+    Scan::read(bytes, &scan::Limits::default()).expect("a readable scan")
+}
+
+pub fn mended(bytes: &[u8], constraints: &Constraints) -> Result<Mended, MendError> {
+    mend(&read(bytes), constraints, mender())
+}
+
+/// A mended scan, welded, and which of its faces are reconstructed.
+pub struct Seen {
+    pub scan: Scan,
+    pub welded: Welded,
+    pub topology: Topology,
+    pub loops: Vec<BoundaryLoop>,
+    pub patch: Vec<usize>,
+}
+
+impl Seen {
+    pub fn of(bytes: &[u8]) -> Seen {
+        let scan = read(bytes);
+        let welded = weld(&scan.surface);
+        let topology = Topology::new(&welded.mesh);
+        let loops = boundary_loops(&welded.mesh, &topology);
+        let new = |f: &usize| {
+            let part = scan.part_of_face(welded.face_of[*f]).expect("a part");
+            scan.parts[part].reconstructed
+        };
+        let patch = (0..welded.mesh.faces.len()).filter(new).collect();
+        Seen {
+            scan,
+            welded,
+            topology,
+            loops,
+            patch,
+        }
+    }
+
+    pub fn patch_area(&self) -> f64 {
+        let areas = face_areas(&self.welded.mesh);
+        self.patch.iter().map(|f| areas[*f]).sum()
+    }
+
+    /// Positions of the patch's vertices that are not on the scan's rim.
+    pub fn invented(&self) -> Vec<Vec3> {
+        let mut scans = vec![false; self.welded.mesh.positions.len()];
+        let faces = self.welded.mesh.faces.iter().enumerate();
+        for (_, face) in faces.filter(|(f, _)| self.patch.binary_search(f).is_err()) {
+            face.iter().for_each(|v| scans[*v as usize] = true);
+        }
+        let positions = self.welded.mesh.positions.iter().zip(&scans);
+        positions.filter(|(_, s)| !**s).map(|(p, _)| *p).collect()
+    }
+}
+
+pub fn area(mesh: &TriMesh) -> f64 {
+    face_areas(mesh).iter().sum()
+}

@@ -1,0 +1,128 @@
+//! What must hold of every mended scan.
+
+use darn::contract::Constraints;
+use darn::mesh::Vec2;
+use darn::mesh::loops::LoopKind;
+use darn::scarffolds::scanned::Hole;
+
+use super::cloth::{ROUND, Seen, area, holed, laid, mended, packed, sheet};
+
+fn holes() -> [Hole; 3] {
+    let centre = Vec2::new(0.47, 0.52);
+    [
+        ROUND,
+        Hole::Blob {
+            centre,
+            radius: 0.15,
+        },
+        Hole::Slit {
+            centre,
+            length: 0.22,
+            width: 0.045,
+            angle: 0.8,
+        },
+    ]
+}
+
+#[test]
+fn holes_of_every_shape_close_and_nothing_else_does() {
+    for (k, hole) in holes().iter().enumerate() {
+        let cut = holed(sheet(k), hole);
+        let before = Seen::of(&packed(&cut.mesh, &[]));
+        let mended = mended(&packed(&cut.mesh, &[]), &Constraints::default()).unwrap();
+        let after = Seen::of(&mended.bytes);
+
+        let kinds: Vec<LoopKind> = after.loops.iter().map(|l| l.kind).collect();
+        assert_eq!(kinds, [LoopKind::Outer], "sheet {k}");
+        assert!(after.topology.non_manifold.is_empty(), "sheet {k}");
+        let kept = after.welded.mesh.faces.len() - after.patch.len();
+        assert_eq!(kept, before.welded.mesh.faces.len(), "sheet {k}");
+        let share = after.patch_area() / area(&cut.lost);
+        assert!((0.85..1.15).contains(&share), "sheet {k}: area {share}");
+
+        let report = &mended.report.holes[0];
+        assert_eq!(report.chart.unwrap().flips, 0);
+        assert_eq!(report.patch.unwrap().seam_gap, 0.0);
+        assert_eq!(report.patch.unwrap().faces as usize, after.patch.len());
+    }
+}
+
+#[test]
+fn a_flat_sheet_gets_a_flat_patch_of_the_lost_area() {
+    let cut = holed(&laid(|u, v| [u, 0.25, -v]), &ROUND);
+    let after = Seen::of(
+        &mended(&packed(&cut.mesh, &[]), &Constraints::default())
+            .unwrap()
+            .bytes,
+    );
+    for p in after.invented() {
+        assert!((p.y - 0.25).abs() < 2e-3, "{p:?}");
+    }
+    let share = after.patch_area() / area(&cut.lost);
+    assert!((share - 1.0).abs() < 2e-3, "{share}");
+}
+
+#[test]
+fn a_cylinder_goes_on_through_its_hole() {
+    let radius = 0.4;
+    let cut = holed(
+        &laid(|u, v| [radius * (u / radius).sin(), v, radius * (u / radius).cos()]),
+        &ROUND,
+    );
+    let after = Seen::of(
+        &mended(&packed(&cut.mesh, &[]), &Constraints::default())
+            .unwrap()
+            .bytes,
+    );
+    let off: Vec<f64> = after
+        .invented()
+        .iter()
+        .map(|p| (p.x.hypot(p.z) - f64::from(radius)).abs())
+        .collect();
+    let mean = off.iter().sum::<f64>() / off.len() as f64;
+    // The hole is 0.26 wide and bulges 0.021 out of its rim's plane.
+    assert!(mean < 0.004, "{mean}");
+}
+
+#[test]
+fn the_same_scan_gives_the_same_bytes() {
+    let bytes = packed(&holed(sheet(1), &ROUND).mesh, &[]);
+    let once = mended(&bytes, &Constraints::default()).unwrap().bytes;
+    let again = mended(&bytes, &Constraints::default()).unwrap().bytes;
+    assert!(once == again);
+}
+
+#[test]
+fn texture_coordinates_go_on_through_the_patch() {
+    let cut = holed(sheet(0), &ROUND);
+    let rest: Vec<[f32; 2]> = cut.rest.iter().map(|p| [p.x as f32, p.y as f32]).collect();
+    let after = Seen::of(
+        &mended(&packed(&cut.mesh, &rest), &Constraints::default())
+            .unwrap()
+            .bytes,
+    );
+    let part = after.scan.parts.iter().find(|p| p.reconstructed).unwrap();
+    let Hole::Circle { centre, radius } = ROUND else {
+        unreachable!()
+    };
+    let mut inside = 0;
+    for uv in part.texcoords[0].iter() {
+        let away = (Vec2::new(uv[0].into(), uv[1].into()) - centre).norm();
+        assert!(away < radius + 0.06, "{uv:?} is no place in the hole");
+        inside += usize::from(away < radius * 0.5);
+    }
+    // The middle of the hole is in the texture, too: about a quarter of the vertices.
+    assert!(inside * 10 > part.texcoords[0].len(), "{inside}");
+}
+
+#[test]
+fn a_scan_that_is_mended_has_nothing_left_to_mend() {
+    let first = mended(
+        &packed(&holed(sheet(2), &ROUND).mesh, &[]),
+        &Constraints::default(),
+    )
+    .unwrap();
+    let second = mended(&first.bytes, &Constraints::default()).unwrap();
+    assert!(second.report.holes.is_empty());
+    assert!(second.bytes == first.bytes);
+}

@@ -1,0 +1,179 @@
+//! What a request may ask of a scan, and what it is told.
+
+use darn::contract::{Anchor, Constraints, HoleSelector};
+use darn::mend::MendError;
+use darn::mesh::{TriMesh, Vec3};
+use darn::scarffolds::scanned::Hole;
+
+use super::cloth::{ROUND, Seen, holed, laid, mended, packed, sheet};
+
+/// Two sheets side by side, each with a hole; the second is moved along x.
+fn pair() -> Vec<u8> {
+    let mut both = holed(sheet(0), &ROUND).mesh;
+    let other = holed(sheet(1), &ROUND).mesh;
+    let base = both.positions.len() as u32;
+    both.positions
+        .extend(other.positions.iter().map(|p| p + Vec3::x() * 5.0));
+    both.faces
+        .extend(other.faces.iter().map(|f| f.map(|v| v + base)));
+    packed(&both, &[])
+}
+
+fn asking(holes: &[HoleSelector]) -> Constraints {
+    Constraints {
+        holes: holes.to_vec(),
+        ..Constraints::default()
+    }
+}
+
+#[test]
+fn all_holes_are_filled_by_default_and_one_by_id_or_place() {
+    let bytes = pair();
+    let all = mended(&bytes, &Constraints::default()).unwrap().report;
+    assert_eq!(all.holes.len(), 2);
+    let second = all.holes[1].id;
+    for selector in [
+        HoleSelector::Id(second),
+        HoleSelector::Near([5.0, 0.0, 0.0]),
+    ] {
+        let one = mended(&bytes, &asking(&[selector])).unwrap();
+        assert_eq!(
+            one.report.holes.iter().map(|h| h.id).collect::<Vec<_>>(),
+            [second]
+        );
+        assert!(one.report.skipped.iter().any(|s| s.code == "not_selected"));
+        assert_eq!(Seen::of(&one.bytes).loops.len(), 3);
+    }
+}
+
+#[test]
+fn a_hole_that_is_not_there_is_named() {
+    let bytes = packed(&holed(sheet(0), &ROUND).mesh, &[]);
+    let error = mended(&bytes, &asking(&[HoleSelector::Id(7)])).unwrap_err();
+    assert_eq!(error.code(), "constraints_do_not_fit");
+    assert_eq!(error.fields()[0].pointer, "/holes/0");
+    assert!(
+        error.fields()[0].detail.contains("there is no loop 7"),
+        "{error}"
+    );
+}
+
+#[test]
+fn the_outer_boundary_is_never_filled() {
+    let report = mended(
+        &packed(&holed(sheet(0), &ROUND).mesh, &[]),
+        &Constraints::default(),
+    )
+    .unwrap()
+    .report;
+    let outer = report
+        .skipped
+        .iter()
+        .find(|s| s.code == "outer_boundary")
+        .unwrap();
+    let error = mended(
+        &packed(&holed(sheet(0), &ROUND).mesh, &[]),
+        &asking(&[HoleSelector::Id(outer.id)]),
+    )
+    .unwrap_err();
+    assert!(
+        error.fields()[0].detail.contains("outer boundary"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_scan_without_holes_comes_back_as_it_was() {
+    let none = Hole::Circle {
+        centre: darn::mesh::Vec2::new(0.5, 0.5),
+        radius: 0.0,
+    };
+    let bytes = packed(&holed(sheet(0), &none).mesh, &[]);
+    let mended = mended(&bytes, &Constraints::default()).unwrap();
+    assert!(mended.report.holes.is_empty());
+    assert!(mended.bytes == bytes);
+}
+
+#[test]
+fn an_anchor_draws_the_cloth_towards_it_and_its_distance_is_told() {
+    let bytes = packed(&holed(&laid(|u, v| [u, 0.0, -v]), &ROUND).mesh, &[]);
+    let anchor = |position| Constraints {
+        anchors: vec![Anchor {
+            hole: None,
+            uv: [0.5, 0.5],
+            position,
+        }],
+        ..Constraints::default()
+    };
+    let height = |c: &Constraints| {
+        let mended = mended(&bytes, c).unwrap();
+        let highest = Seen::of(&mended.bytes)
+            .invented()
+            .iter()
+            .map(|p| p.y)
+            .fold(f64::MIN, f64::max);
+        (
+            highest,
+            mended
+                .report
+                .holes
+                .first()
+                .and_then(|h| h.anchors.first().map(|a| a.distance)),
+        )
+    };
+    let middle = [0.5, 0.03, -0.48];
+    let (lifted, kept) = height(&anchor(middle));
+    let (flat, none) = height(&Constraints::default());
+    assert!(lifted > flat + 0.002, "{lifted} {flat}");
+    assert_eq!(none, None);
+    assert!(kept.unwrap() < 0.1, "{kept:?}");
+}
+
+#[test]
+fn an_anchor_beside_the_hole_is_refused() {
+    let bytes = packed(&holed(sheet(0), &ROUND).mesh, &[]);
+    let constraints = Constraints {
+        anchors: vec![Anchor {
+            hole: None,
+            uv: [0.01, 0.01],
+            position: [0.0, 0.0, 0.0],
+        }],
+        ..Constraints::default()
+    };
+    let error = mended(&bytes, &constraints).unwrap_err();
+    assert!(
+        matches!(&error, MendError::Constraints(f) if f[0].pointer == "/anchors/0/uv"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_tube_keeps_its_ends_and_loses_its_hole() {
+    // A closed tube with a square hole: neither end is touched.
+    let (around, along) = (48u32, 40u32);
+    let at = |i: u32, j: u32| {
+        let angle = std::f64::consts::TAU * f64::from(i) / f64::from(around);
+        Vec3::new(angle.cos(), 0.12 * f64::from(j), angle.sin())
+    };
+    let positions = (0..=along)
+        .flat_map(|j| (0..around).map(move |i| at(i, j)))
+        .collect();
+    let mut faces = Vec::new();
+    for j in 0..along {
+        for i in (0..around).filter(|i| !((5..12).contains(i) && (15..22).contains(&j))) {
+            let (a, b) = (j * around + i, j * around + (i + 1) % around);
+            faces.extend([[a, a + around, b], [b, a + around, b + around]]);
+        }
+    }
+    let mended = mended(
+        &packed(&TriMesh { positions, faces }, &[]),
+        &Constraints::default(),
+    )
+    .unwrap();
+    assert_eq!(mended.report.holes.len(), 1);
+    let after = Seen::of(&mended.bytes);
+    assert_eq!(after.loops.len(), 2);
+    for p in after.invented() {
+        assert!((p.x.hypot(p.z) - 1.0).abs() < 0.05, "{p:?}");
+    }
+}
