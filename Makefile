@@ -1,0 +1,42 @@
+# Everything a person or CI does with darn. One cargo profile (release) throughout: burn is optimised once.
+.DEFAULT_GOAL := help
+SHELL := bash
+
+CARGO ?= cargo
+export DARN_LISTEN ?= 127.0.0.1:8080
+
+.PHONY: help setup build run test lint fmt docs clean
+
+help: ## Show this list
+	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{ printf "make %-6s %s\n", $$1, $$2 }'
+
+setup: ## Install what is missing: Debian packages, the glTF validator
+	@scripts/setup
+
+build: ## Build target/release/darn
+	$(CARGO) build --release --locked
+
+run: ## Set up, build, serve on DARN_LISTEN, mend the example through HTTP, go on serving
+	@scripts/setup run
+	$(CARGO) build --release --locked
+	@scripts/run
+
+test: ## Set up and run all tests
+	@scripts/setup
+	$(CARGO) test --release --locked
+	$(CARGO) build --release --locked
+	@scripts/validate
+
+lint: ## Check formatting and lints, warnings are errors
+	$(CARGO) fmt --check
+	$(CARGO) clippy --release --locked --all-targets -- -D warnings
+
+fmt: ## Format the code
+	$(CARGO) fmt
+
+docs: ## Build the library's documentation, warnings are errors
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --no-deps --lib
+
+clean: ## Remove what was built
+	$(CARGO) clean
+	rm -rf tests/validator/node_modules
