@@ -58,26 +58,22 @@ pub fn relax(
     if sheet.free == 0 {
         return Ok(0);
     }
-    let triangles: Vec<Triangle> = sheet
-        .faces
-        .iter()
+    let triangles: Vec<Triangle> = (sheet.faces.iter())
         .map(|f| Triangle::at_rest(f, sheet.rest))
         .collect();
     let edge = mean_edge(&triangles);
-    let mut steady = bending_rows(sheet, &triangles, positions, elastics);
-    steady
-        .iter_mut()
-        .for_each(|row| row.weight *= (elastics.bending * edge).powi(2));
-    steady.extend(tether_rows(
+    let mut bends = bending_rows(sheet, &triangles, positions, elastics);
+    (bends.iter_mut()).for_each(|row| row.weight *= (elastics.bending * edge).powi(2));
+    let tethers = tether_rows(
         sheet,
         &triangles,
         positions,
         (elastics.tether * edge).powi(-2),
-    ));
+    );
 
     let mut matrix = Symmetric::zero(sheet.free);
     let mut constant = vec![[0.0; 3]; sheet.free];
-    for row in &steady {
+    for row in bends.iter().chain(&tethers) {
         row.add_to(&mut matrix, &mut constant, sheet.free, positions);
     }
     for (face, triangle) in sheet.faces.iter().zip(&triangles) {
@@ -85,12 +81,12 @@ pub fn relax(
             let terms = (0..3)
                 .map(|k| (face[k] as usize, triangle.gradient[k][c]))
                 .collect();
-            Row {
+            let row = Row {
                 terms,
                 weight: triangle.area,
                 target: Vec3::zeros(),
-            }
-            .add_to(&mut matrix, &mut constant, sheet.free, positions);
+            };
+            row.add_to(&mut matrix, &mut constant, sheet.free, positions);
         }
     }
     let factor = matrix.factor()?;
@@ -158,11 +154,16 @@ impl Triangle {
         }
     }
 
+    /// The deformation gradient: columns are the images of the chart's axes.
+    fn deformation(&self, face: &[u32; 3], positions: &[Vec3]) -> Matrix3x2<f64> {
+        (0..3)
+            .map(|k| positions[face[k] as usize] * self.gradient[k].transpose())
+            .sum()
+    }
+
     /// The deformation gradient with its singular values brought within 1 ± `strain`.
     fn within(&self, face: &[u32; 3], positions: &[Vec3], strain: f64) -> Matrix3x2<f64> {
-        let f: Matrix3x2<f64> = (0..3)
-            .map(|k| positions[face[k] as usize] * self.gradient[k].transpose())
-            .sum();
+        let f = self.deformation(face, positions);
         let limited = |square: f64| {
             let s = square.max(1e-12).sqrt();
             s.clamp(1.0 - strain, 1.0 + strain) / s

@@ -5,6 +5,7 @@
 pub mod attributes;
 mod cloth;
 mod harmonic;
+mod hem;
 pub mod quality;
 mod triangulate;
 mod untangle;
@@ -16,6 +17,8 @@ use crate::flatten::Chart;
 use crate::grid;
 use crate::mesh::region::Region;
 use crate::mesh::{Vec2, Vec3};
+use hem::Hem;
+use triangulate::Triangulation;
 
 /// Why a hole could not be patched.
 #[derive(Debug, thiserror::Error, PartialEq)]
@@ -119,34 +122,40 @@ pub fn build(
         edges.contains(&(a.min(b), a.max(b)))
     });
 
-    let mut positions: Vec<Vec3> = tiled
-        .points
-        .iter()
+    let own: Vec<Vec3> = (rim.iter())
+        .map(|v| region.mesh.positions[*v as usize])
+        .collect();
+    let drawn = drawing(&tiled, chart, filled, &own)?;
+    let hem = Hem::around(&rim, &tiled, region, chart);
+    let (inner, strain_rounds) = hem.relax(drawn, &options.elastics)?;
+    Ok(Patch {
+        rim,
+        flat: tiled.points,
+        positions: own.into_iter().chain(inner).collect(),
+        faces: tiled.faces,
+        strain_rounds,
+    })
+}
+
+/// The inner points read off the filled grid, shifted so that the seam is closed: the differences at the rim are spread harmonically.
+fn drawing(
+    tiled: &Triangulation,
+    chart: &Chart,
+    filled: &[Vec3],
+    own: &[Vec3],
+) -> Result<Vec<Vec3>, PatchError> {
+    let drawn: Vec<Vec3> = (tiled.points.iter())
         .map(|p| grid::evaluate(filled, chart.frame.uv(*p)))
         .collect();
-    let own = |k: usize| region.mesh.positions[rim[k] as usize];
-    let gaps: Vec<[f64; 3]> = (0..rim.len())
-        .map(|k| (own(k) - positions[k]).into())
+    let gaps: Vec<[f64; 3]> = (own.iter().zip(&drawn))
+        .map(|(own, drawn)| (own - drawn).into())
         .collect();
-    let held: Vec<u32> = (0..rim.len() as u32).collect();
+    let held: Vec<u32> = (0..own.len() as u32).collect();
     let spread = harmonic::Extension::new(&tiled.points, &tiled.faces, &held)
         .and_then(|e| e.extend(&gaps))
         .map_err(|_| PatchError::Singular { stage: "seam" })?;
-    for (p, d) in positions.iter_mut().zip(&spread) {
-        *p += Vec3::from(*d);
-    }
-    for (k, p) in positions.iter_mut().take(rim.len()).enumerate() {
-        *p = own(k);
-    }
-    let mut patch = Patch {
-        rim,
-        flat: tiled.points,
-        positions,
-        faces: tiled.faces,
-        strain_rounds: 0,
-    };
-    patch.strain_rounds = limit_strain(&mut patch, region, chart, &options.elastics)?;
-    Ok(patch)
+    let closed = drawn.iter().zip(&spread).map(|(p, d)| p + Vec3::from(*d));
+    Ok(closed.skip(own.len()).collect())
 }
 
 /// Median edge length of the region in the plane: the scan's own resolution.
@@ -166,61 +175,4 @@ fn median_edge(region: &Region, chart: &Chart) -> f64 {
     } else {
         *edges.select_nth_unstable_by(middle, f64::total_cmp).1
     }
-}
-
-/// Relaxes the patch's inner vertices together with the triangles of the scan that touch its rim, which are held.
-fn limit_strain(
-    patch: &mut Patch,
-    region: &Region,
-    chart: &Chart,
-    elastics: &Elastics,
-) -> Result<usize, PatchError> {
-    let (rim, count) = (patch.rim.len(), patch.positions.len());
-    let free = count - rim;
-    // Order for `relax`: inner vertices first, then the rim, then the scan's vertices around it.
-    let place = |v: u32| {
-        if (v as usize) < rim {
-            v + free as u32
-        } else {
-            v - rim as u32
-        }
-    };
-    let mut rest: Vec<Vec2> = patch.flat[rim..]
-        .iter()
-        .chain(&patch.flat[..rim])
-        .copied()
-        .collect();
-    let mut positions: Vec<Vec3> = patch.positions[rim..]
-        .iter()
-        .chain(&patch.positions[..rim])
-        .copied()
-        .collect();
-    let mut faces: Vec<[u32; 3]> = patch.faces.iter().map(|f| f.map(place)).collect();
-
-    let mut sheet_index = vec![u32::MAX; region.mesh.positions.len()];
-    for (k, v) in patch.rim.iter().enumerate() {
-        sheet_index[*v as usize] = (free + k) as u32;
-    }
-    let touches = |f: &&[u32; 3]| f.iter().any(|v| sheet_index[*v as usize] != u32::MAX);
-    let around: Vec<[u32; 3]> = region.mesh.faces.iter().filter(touches).copied().collect();
-    for face in around {
-        faces.push(face.map(|v| {
-            let v = v as usize;
-            if sheet_index[v] == u32::MAX {
-                sheet_index[v] = rest.len() as u32;
-                rest.push(chart.flat[v]);
-                positions.push(region.mesh.positions[v]);
-            }
-            sheet_index[v]
-        }));
-    }
-    let sheet = cloth::Sheet {
-        rest: &rest,
-        faces: &faces,
-        free,
-    };
-    let rounds = cloth::relax(&sheet, &mut positions, elastics)
-        .map_err(|_| PatchError::Singular { stage: "strain" })?;
-    patch.positions[rim..].copy_from_slice(&positions[..free]);
-    Ok(rounds)
 }
