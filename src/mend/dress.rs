@@ -40,7 +40,7 @@ pub fn addition(
         .iter()
         .map(|s| s.filter(|(p, _)| alike(*p)).map(|(_, c)| c))
         .collect();
-    let mut any = vec![0; region.mesh.positions.len()];
+    let mut any = vec![u32::MAX; region.mesh.positions.len()];
     let mut part_of = BTreeMap::new();
     for (face, source) in region.mesh.faces.iter().zip(&sources) {
         let Some((p, scan_corners)) = source else {
@@ -49,7 +49,7 @@ pub fn addition(
         for (v, s) in face.iter().zip(scan_corners) {
             // A vertex of the patch's own node is preferred: its stored bits are copied.
             let own = scan.parts[*p].node == look.node;
-            if own || part_of.is_empty() {
+            if own || any[*v as usize] == u32::MAX {
                 any[*v as usize] = *s;
             }
             if alike(*p) {

@@ -47,7 +47,13 @@ pub struct Dressed {
 
 /// Carries the columns over into the patch.
 pub fn dress(patch: &Patch, region: &Region, chart: &Chart, columns: &Columns) -> Dressed {
-    let rim = rim_edges(patch, region, columns);
+    let islands = islands(columns);
+    let around = Around {
+        columns,
+        rim: rim_edges(patch, region, columns, &islands),
+        islands,
+    };
+    let rim = &around.rim;
     let labels: Vec<u32> = rim
         .iter()
         .flatten()
@@ -55,17 +61,17 @@ pub fn dress(patch: &Patch, region: &Region, chart: &Chart, columns: &Columns) -
         .collect::<std::collections::BTreeSet<_>>()
         .into_iter()
         .collect();
-    let faces = face_labels(patch, &rim, &labels);
+    let faces = face_labels(patch, rim, &labels);
     let sheets: BTreeMap<u32, Vec<Vec<f64>>> = labels
         .iter()
-        .map(|l| (*l, continued(*l, patch, region, chart, (columns, &rim))))
+        .map(|l| (*l, continued(*l, patch, region, chart, &around)))
         .collect();
 
     let mut index = BTreeMap::new();
     let mut corners: Vec<Corner> = Vec::new();
     let mut place = |vertex: u32, label: Option<u32>| {
         *index.entry((vertex, label)).or_insert_with(|| {
-            let own = label.and_then(|l| scan_vertex(&rim, vertex, l));
+            let own = label.and_then(|l| scan_vertex(rim, vertex, l));
             let at_rim = patch.rim.get(vertex as usize);
             let values = match (own, label) {
                 (Some(scan), _) => (columns.values)(scan),
@@ -89,6 +95,14 @@ pub fn dress(patch: &Patch, region: &Region, chart: &Chart, columns: &Columns) -
     Dressed { corners, faces }
 }
 
+/// The attributes around a hole, sorted out.
+struct Around<'a> {
+    columns: &'a Columns<'a>,
+    /// The scan's side of every rim edge, in the patch's order.
+    rim: Vec<Option<RimEdge>>,
+    islands: Islands,
+}
+
 /// The scan's side of a rim edge, from rim vertex k to k + 1.
 #[derive(Debug, Clone, Copy)]
 struct RimEdge {
@@ -109,8 +123,11 @@ fn scan_vertex(rim: &[Option<RimEdge>], vertex: u32, island: u32) -> Option<u32>
         .or_else(|| of(rim[(k + rim.len() - 1) % rim.len()]).map(|e| e.to))
 }
 
+/// The island of every scan vertex that has attributes to carry.
+type Islands = BTreeMap<u32, u32>;
+
 /// Islands of the texture: region faces joined where they share scan vertices; named by their lowest scan vertex.
-fn islands(columns: &Columns) -> BTreeMap<u32, u32> {
+fn islands(columns: &Columns) -> Islands {
     let mut parent: BTreeMap<u32, u32> = BTreeMap::new();
     fn root(parent: &BTreeMap<u32, u32>, mut v: u32) -> u32 {
         while parent[&v] != v {
@@ -133,8 +150,12 @@ fn islands(columns: &Columns) -> BTreeMap<u32, u32> {
 }
 
 /// The scan's side of every rim edge, in the patch's order; `None` where the face there has no attributes to carry.
-fn rim_edges(patch: &Patch, region: &Region, columns: &Columns) -> Vec<Option<RimEdge>> {
-    let island = islands(columns);
+fn rim_edges(
+    patch: &Patch,
+    region: &Region,
+    columns: &Columns,
+    islands: &Islands,
+) -> Vec<Option<RimEdge>> {
     let count = patch.rim.len();
     // The face beside the rim runs along it the other way round.
     let wanted: BTreeMap<(u32, u32), usize> = (0..count)
@@ -147,7 +168,7 @@ fn rim_edges(patch: &Patch, region: &Region, columns: &Columns) -> Vec<Option<Ri
             if let Some(edge) = wanted.get(&(face[k], face[(k + 1) % 3])) {
                 let (to, from) = (corners[k], corners[(k + 1) % 3]);
                 edges[*edge] = Some(RimEdge {
-                    island: island[&from],
+                    island: islands[&from],
                     from,
                     to,
                 });
@@ -207,13 +228,13 @@ fn continued(
     patch: &Patch,
     region: &Region,
     chart: &Chart,
-    (columns, rim): (&Columns, &[Option<RimEdge>]),
+    around: &Around,
 ) -> Vec<Vec<f64>> {
-    let island = islands(columns);
+    let (columns, rim) = (around.columns, &around.rim);
     let mut samples: BTreeMap<u32, Vec2> = BTreeMap::new();
     for (face, corners) in region.mesh.faces.iter().zip(columns.corners) {
         for (v, scan) in face.iter().zip(corners.iter().flatten()) {
-            if island[scan] == label {
+            if around.islands[scan] == label {
                 samples.insert(*scan, chart.flat[*v as usize]);
             }
         }

@@ -10,6 +10,9 @@ use crate::mesh::Vec2;
 /// Lattice points nearer to the rim than this, in lattice spacings, are left out: they would make slivers.
 const CLEARANCE: f64 = 0.62;
 
+/// Most lattice spacings across a polygon: a hair's breadth of cloth in a wide ragged rim must not make millions of empty rows.
+const FINEST: f64 = 4000.0;
+
 /// A triangulated polygon.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Triangulation {
@@ -33,6 +36,10 @@ pub fn triangulate(
         return Err(PatchError::RimCrosses);
     }
     // A triangular lattice of spacing h has one point per h²·√3/2.
+    let extent = (polygon.iter())
+        .map(|p| (p - polygon[0]).amax())
+        .fold(0.0, f64::max);
+    let spacing = spacing.max(extent / FINEST);
     let spacing = spacing.max((area / most.max(1) as f64 / 0.75f64.sqrt()).sqrt());
     let mut points = polygon.to_vec();
     points.extend(lattice(polygon, spacing));

@@ -116,6 +116,43 @@ fn texture_coordinates_go_on_through_the_patch() {
 }
 
 #[test]
+fn a_texture_seam_runs_on_through_the_patch() {
+    let cut = holed(sheet(1), &ROUND);
+    // Right of the middle the texture is another island, mirrored: vertices on the border between them are doubled.
+    let mut mesh = cut.mesh.clone();
+    let mut texture: Vec<[f32; 2]> = (cut.rest.iter())
+        .map(|p| [0.4 * p.x as f32, p.y as f32])
+        .collect();
+    let mut twin = std::collections::BTreeMap::new();
+    for face in &mut mesh.faces {
+        let middle: f64 = face.iter().map(|v| cut.rest[*v as usize].x).sum::<f64>() / 3.0;
+        if middle > 0.5 {
+            *face = face.map(|v| {
+                *twin.entry(v).or_insert_with(|| {
+                    let rest = cut.rest[v as usize];
+                    mesh.positions.push(cut.mesh.positions[v as usize]);
+                    texture.push([1.0 - 0.4 * rest.x as f32, rest.y as f32]);
+                    mesh.positions.len() as u32 - 1
+                })
+            });
+        }
+    }
+    let mended = mended(&packed(&mesh, &texture), &Constraints::default()).unwrap();
+    let after = Seen::of(&mended.bytes);
+    assert_eq!(after.loops.len(), 1);
+    let part = after.scan.parts.iter().find(|p| p.reconstructed).unwrap();
+    let uv = |v: u32| part.texcoords[0][(v - part.vertices.start) as usize];
+    let faces = part.faces.start as usize..part.faces.end as usize;
+    for face in &after.scan.surface.faces[faces] {
+        for k in 0..3 {
+            let (a, b) = (uv(face[k]), uv(face[(k + 1) % 3]));
+            let smeared = (a[0] - b[0]).abs().max((a[1] - b[1]).abs());
+            assert!(smeared < 0.1, "a triangle spans two islands: {a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
 fn a_scan_that_is_mended_has_nothing_left_to_mend() {
     let first = mended(
         &packed(&holed(sheet(2), &ROUND).mesh, &[]),
