@@ -200,7 +200,7 @@ mod tests {
 
     fn plane(a: Vec3, b: Vec3, c: Vec3) -> Vec<Vec3> {
         (0..CELLS)
-            .map(|k| cell_centre(k))
+            .map(cell_centre)
             .map(|uv| a + b * uv.x + c * uv.y)
             .collect()
     }

@@ -39,7 +39,16 @@ impl Menders for Bridge {
     }
 
     fn find_holes(&self, scan: &[u8]) -> Result<v1::HolesReport, Refusal> {
-        mend::find_holes(&self.scan(scan)?, &self.mender.limits).map_err(|error| of_mend(&error))
+        let started = Instant::now();
+        let scan = self.scan(scan)?;
+        let read = started.elapsed().as_secs_f64() * 1e3;
+        let mut found =
+            mend::find_holes(&scan, &self.mender.limits).map_err(|error| of_mend(&error))?;
+        if let Some(timings) = &mut found.timings {
+            timings.read = read;
+            timings.total += read;
+        }
+        Ok(found)
     }
 
     fn warm_up(&self) -> Result<(), Refusal> {

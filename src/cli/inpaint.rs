@@ -74,7 +74,7 @@ fn constraints(path: &Path) -> Result<Constraints, Failure> {
 fn summary(report: &Report) -> String {
     let mut text = String::new();
     for hole in &report.holes {
-        let patch = hole.patch.clone().unwrap_or_default();
+        let patch = hole.patch.unwrap_or_default();
         let crossings = match patch.self_intersections {
             0 => String::new(),
             n => format!(", {n} self-intersections"),

@@ -9,7 +9,7 @@ use crate::mesh::{TriMesh, Vec2};
 /// Most rounds of local and global steps; the stop test usually ends them long before.
 const ROUNDS: usize = 150;
 /// Rounds end when one lowers the energy by less than this share.
-const GAIN: f64 = 1e-5;
+const GAIN: f64 = 1e-4;
 
 /// Minimises ½ Σ_f Σ_{e∈f} cot θₑ ‖e_uv − R_f e‖² from a start without flips; may flip faces. Returns the rounds, too.
 pub fn minimise(

@@ -75,6 +75,12 @@ impl Cloth {
         }
     }
 
+    /// Whether the mesh a loop lies on is drawn here for the first time: a patch on a mesh shows at every node that draws it.
+    pub fn on_first_instance(&self, scan: &Scan, rim: &BoundaryLoop) -> bool {
+        let part = (rim.half_edges.first()).and_then(|h| self.source(scan, h / 3));
+        part.is_none_or(|(part, _)| scan.parts[part].first_instance)
+    }
+
     /// What a person should know about the scan as a whole.
     pub fn notes(&self, scan: &Scan) -> Vec<String> {
         let mut notes = Vec::new();
@@ -86,8 +92,16 @@ impl Cloth {
         }
         if !self.topology.non_manifold.is_empty() {
             notes.push(format!(
-                "{} triangle side(s) lie on edges shared by more than two triangles",
+                "{} triangle side(s) lie on edges where more than two triangles meet, or two that face opposite ways; \
+                 the cloth was taken to end there",
                 self.topology.non_manifold.len()
+            ));
+        }
+        let touching = self.touching();
+        if touching > 0 {
+            notes.push(format!(
+                "boundary loops touch themselves or each other at {touching} point(s); where a hole touches the outer boundary \
+                 it is part of it and stays open"
             ));
         }
         if scan.parts.iter().any(|p| p.shared) {
@@ -96,6 +110,20 @@ impl Cloth {
             );
         }
         notes
+    }
+
+    /// Places where boundary loops touch in a point (bow-ties).
+    fn touching(&self) -> usize {
+        let place = |v: &u32| self.welded.mesh.positions[*v as usize];
+        let ends = self.loops.iter().flat_map(|l| &l.vertices).map(place);
+        let mut places: Vec<[u64; 3]> = ends.map(|p| [p.x, p.y, p.z].map(f64::to_bits)).collect();
+        places.sort_unstable();
+        let mut shared: Vec<[u64; 3]> = (places.windows(2))
+            .filter(|w| w[0] == w[1])
+            .map(|w| w[0])
+            .collect();
+        shared.dedup();
+        shared.len()
     }
 }
 

@@ -1,6 +1,6 @@
 //! Why a scan could not be mended, and the stable word programs know each reason by.
 
-use crate::contract::FieldError;
+use crate::contract::{FieldError, v1};
 use crate::flatten::FlattenError;
 use crate::mesh::region::RegionError;
 use crate::net::NetError;
@@ -13,6 +13,12 @@ pub enum MendError {
     /// Constraints that do not fit this scan.
     #[error("{} constraint(s) do not fit this scan: {}", .0.len(), told(.0))]
     Constraints(Vec<FieldError>),
+    /// Nothing to fill.
+    #[error("the scan has no hole to fill{}", left(.skipped))]
+    NoHoles {
+        /// Its loops and why they are left as they are.
+        skipped: Vec<v1::Skipped>,
+    },
     /// The hole's rim runs through an edge that more than two triangles share.
     #[error("hole {hole} runs through non-manifold edges; its rim is not a single closed line")]
     NonManifold {
@@ -66,6 +72,7 @@ impl MendError {
     pub fn code(&self) -> &'static str {
         match self {
             MendError::Constraints(_) => "constraints_do_not_fit",
+            MendError::NoHoles { .. } => "no_holes",
             MendError::NonManifold { .. } => "non_manifold_rim",
             MendError::Region { .. } => "not_a_disk",
             MendError::Flatten { .. } => "not_cloth_like",
@@ -100,4 +107,22 @@ fn told(fields: &[FieldError]) -> String {
         .map(|f| format!("{}: {}", f.pointer, f.detail))
         .collect();
     each.join("; ")
+}
+
+fn left(skipped: &[v1::Skipped]) -> String {
+    match skipped {
+        [] => ": its surface is closed, without any boundary loop".to_owned(),
+        loops => {
+            let each: Vec<String> = (loops.iter().take(5))
+                .map(|l| format!("loop {} is left ({})", l.id, l.reason))
+                .collect();
+            let more = loops.len().saturating_sub(each.len());
+            let rest = if more > 0 {
+                format!("; and {more} more")
+            } else {
+                String::new()
+            };
+            format!(": {}{rest}", each.join("; "))
+        }
+    }
 }

@@ -10,7 +10,8 @@ use crate::flatten::{self, Chart};
 use crate::grid::{self, Grid, Normalisation};
 use crate::mesh::region::{self, Region};
 use crate::mesh::{Vec2, Vec3};
-use crate::patch::{self, Patch, PatchError, quality};
+use crate::patch::quality::{self, Quality};
+use crate::patch::{self, Patch, PatchError};
 use crate::scan::{Addition, Scan};
 
 /// How much of the grid's side the hole should take, so that hole and context share it as in training.
@@ -19,6 +20,8 @@ const SHARE: f64 = 0.5;
 const OFF: f64 = 1.3;
 /// Reach of each further try, when a region gives no usable chart.
 const SMALLER: f64 = 0.6;
+/// Largest stretch of an edge, of chart or patch, that goes without a note.
+const SUSPICIOUS: f64 = 1.5;
 /// Tries with smaller and smaller regions.
 const TRIES: usize = 4;
 
@@ -53,6 +56,9 @@ pub fn mend(
         ..laid.timings
     };
     timings.report = milliseconds(started);
+    let anchors: Vec<v1::AnchorReport> = (chosen.anchors.iter())
+        .map(|(_, a)| kept(&patch, &laid.chart, a))
+        .collect();
     let report = v1::HoleReport {
         id: chosen.id,
         kind: kind(rim.kind) as i32,
@@ -77,13 +83,9 @@ pub fn mend(
             self_intersections: quality.self_intersections as u32,
             strain_iterations: patch.strain_rounds as u32,
         }),
-        anchors: chosen
-            .anchors
-            .iter()
-            .map(|(_, a)| kept(&patch, &laid.chart, a))
-            .collect(),
         timings: Some(timings),
-        notes: laid.notes(),
+        notes: laid.notes(&quality, &anchors),
+        anchors,
     };
     let addition = dress::addition(
         (scan, cloth),
@@ -242,15 +244,41 @@ impl Laid {
         }
     }
 
-    fn notes(&self) -> Vec<String> {
-        let others = self.region.holes.len();
-        if others == 0 {
-            Vec::new()
-        } else {
-            vec![format!(
-                "{others} other hole(s) lie in the region and were unknown to the network"
-            )]
+    /// What a person should look at before trusting the patch.
+    fn notes(&self, quality: &Quality, anchors: &[v1::AnchorReport]) -> Vec<String> {
+        let mut notes = Vec::new();
+        if self.chart.stretch_max > SUSPICIOUS {
+            notes.push(format!(
+                "the cloth around the hole does not lie flat well: an edge is stretched {:.2} times",
+                self.chart.stretch_max
+            ));
         }
+        if quality.stretch_max > SUSPICIOUS {
+            let most = quality.stretch_max;
+            notes.push(format!("an edge of the patch is stretched {most:.2} times"));
+        }
+        if quality.self_intersections > 0 {
+            notes.push(format!(
+                "the patch cuts itself or the cloth around it in {} pair(s) of triangles",
+                quality.self_intersections
+            ));
+        }
+        let others = self.region.holes.len();
+        if others > 0 {
+            notes.push(format!(
+                "{others} other hole(s) lie in the region and were unknown to the network"
+            ));
+        }
+        let extent = self.hole_extent();
+        for (k, anchor) in anchors.iter().enumerate() {
+            if anchor.distance > extent {
+                notes.push(format!(
+                    "anchor {k} is {:.3} away from the cloth, farther than the hole is wide ({extent:.3})",
+                    anchor.distance
+                ));
+            }
+        }
+        notes
     }
 }
 

@@ -62,11 +62,11 @@ impl Mended {
 /// Fills the holes of a scan that the constraints ask for; by default all of them, never an outer boundary or a tube's end.
 ///
 /// # Errors
-/// When a constraint does not fit the scan, or when a hole asked for cannot be filled. A scan without holes comes back as it was.
+/// When a constraint does not fit the scan, or when a hole asked for cannot be filled, or when there is none.
 pub fn mend(scan: &Scan, constraints: &Constraints, mender: &Mender) -> Result<Mended, MendError> {
     let started = Instant::now();
     let cloth = Cloth::of(scan);
-    let selection = select::select(&cloth, constraints)?;
+    let selection = select::select(scan, &cloth, constraints)?;
     let holes_started = Instant::now();
     let mut additions: Vec<Addition> = Vec::new();
     let mut holes = Vec::new();

@@ -8,6 +8,7 @@ use crate::contract::{Anchor, Constraints, FieldError, HoleSelector, v1};
 use crate::mesh::Vec3;
 use crate::mesh::loops::{BoundaryLoop, LoopKind};
 use crate::mesh::nearest::distance_to_loop;
+use crate::scan::Scan;
 
 /// What to fill and what not.
 pub struct Selection {
@@ -28,21 +29,20 @@ pub struct Chosen {
 /// Matches a request to the loops of a scan.
 ///
 /// # Errors
-/// `Constraints` for every selector or anchor that matches no loop that may be filled; `NonManifold` when an asked-for rim is no closed line.
-pub fn select(cloth: &Cloth, constraints: &Constraints) -> Result<Selection, MendError> {
+/// `NoHoles` when nobody chose and there is none; `Constraints` for every selector or anchor that matches no loop that may be filled; `NonManifold` when an asked-for rim is no closed line.
+pub fn select(
+    scan: &Scan,
+    cloth: &Cloth,
+    constraints: &Constraints,
+) -> Result<Selection, MendError> {
     let mut wrong = Vec::new();
     let mut chosen: BTreeMap<u32, Vec<(usize, Anchor)>> = BTreeMap::new();
     if constraints.holes.is_empty() {
-        chosen.extend(
-            cloth
-                .loops
-                .iter()
-                .filter(|l| fillable(l))
-                .map(|l| (l.id, Vec::new())),
-        );
+        let fillable = (cloth.loops.iter()).filter(|l| reason_to_skip(scan, cloth, l).is_none());
+        chosen.extend(fillable.map(|l| (l.id, Vec::new())));
     }
     for (i, selector) in constraints.holes.iter().enumerate() {
-        match find(cloth, selector) {
+        match find(scan, cloth, selector) {
             Ok(id) => drop(chosen.entry(id).or_default()),
             Err(detail) => wrong.push(FieldError::new(format!("/holes/{i}"), detail)),
         }
@@ -63,12 +63,13 @@ pub fn select(cloth: &Cloth, constraints: &Constraints) -> Result<Selection, Men
     {
         return Err(MendError::NonManifold { hole });
     }
-    let skipped = cloth
-        .loops
-        .iter()
+    let skipped: Vec<v1::Skipped> = (cloth.loops.iter())
         .filter(|l| !chosen.contains_key(&l.id))
-        .map(|l| skipped(l))
+        .map(|l| skipped(scan, cloth, l))
         .collect();
+    if chosen.is_empty() {
+        return Err(MendError::NoHoles { skipped });
+    }
     let chosen = chosen
         .into_iter()
         .map(|(id, anchors)| Chosen { id, anchors })
@@ -76,12 +77,7 @@ pub fn select(cloth: &Cloth, constraints: &Constraints) -> Result<Selection, Men
     Ok(Selection { chosen, skipped })
 }
 
-/// Whether a loop is filled when nobody asks.
-fn fillable(rim: &BoundaryLoop) -> bool {
-    rim.kind == LoopKind::Hole && !rim.non_manifold
-}
-
-fn find(cloth: &Cloth, selector: &HoleSelector) -> Result<u32, String> {
+fn find(scan: &Scan, cloth: &Cloth, selector: &HoleSelector) -> Result<u32, String> {
     match selector {
         HoleSelector::Id(id) => {
             let rim = cloth.loops.get(*id as usize).ok_or_else(|| {
@@ -90,14 +86,9 @@ fn find(cloth: &Cloth, selector: &HoleSelector) -> Result<u32, String> {
                     cloth.loops.len()
                 )
             })?;
-            match rim.kind {
-                LoopKind::Hole => Ok(*id),
-                LoopKind::Outer => Err(format!(
-                    "loop {id} is the outer boundary, not a hole; it is never filled"
-                )),
-                LoopKind::TubeEnd => Err(format!(
-                    "loop {id} is the end of a tube, not a hole; it is never filled"
-                )),
+            match reason_to_skip(scan, cloth, rim) {
+                Some(("non_manifold", _)) | None => Ok(*id),
+                Some((_, reason)) => Err(format!("loop {id} is never filled: it is {reason}")),
             }
         }
         HoleSelector::Near(point) => {
@@ -123,16 +114,30 @@ fn owner(chosen: &BTreeMap<u32, Vec<(usize, Anchor)>>, anchor: &Anchor) -> Resul
     }
 }
 
-fn skipped(rim: &BoundaryLoop) -> v1::Skipped {
-    let (code, reason) = match rim.kind {
-        LoopKind::Outer => ("outer_boundary", "the cloth's own edge"),
-        LoopKind::TubeEnd => ("tube_end", "the end of a tube, such as a sleeve"),
-        LoopKind::Hole if rim.non_manifold => (
+/// Why a loop is left as it is unless, or even if, somebody asks for it: a stable word and a phrase; `None` for a hole.
+fn reason_to_skip(
+    scan: &Scan,
+    cloth: &Cloth,
+    rim: &BoundaryLoop,
+) -> Option<(&'static str, &'static str)> {
+    match rim.kind {
+        LoopKind::Outer => Some(("outer_boundary", "the cloth's own edge, the outer boundary")),
+        LoopKind::TubeEnd => Some(("tube_end", "the end of a tube, such as a sleeve")),
+        LoopKind::Hole if rim.non_manifold => Some((
             "non_manifold",
-            "its rim runs through edges shared by more than two triangles",
-        ),
-        LoopKind::Hole => ("not_selected", "the request chose other holes"),
-    };
+            "a hole whose rim runs through edges shared by more than two triangles",
+        )),
+        LoopKind::Hole if !cloth.on_first_instance(scan, rim) => Some((
+            "same_mesh",
+            "a hole of a mesh that another node draws, too; the patch there shows here as well",
+        )),
+        LoopKind::Hole => None,
+    }
+}
+
+fn skipped(scan: &Scan, cloth: &Cloth, rim: &BoundaryLoop) -> v1::Skipped {
+    let not_selected = ("not_selected", "a hole that the request did not choose");
+    let (code, reason) = reason_to_skip(scan, cloth, rim).unwrap_or(not_selected);
     v1::Skipped {
         id: rim.id,
         kind: kind(rim.kind) as i32,

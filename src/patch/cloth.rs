@@ -94,9 +94,9 @@ pub fn relax(
         let mut rhs = constant.clone();
         for (face, triangle) in sheet.faces.iter().zip(&triangles) {
             let pull = triangle.within(face, positions, elastics.strain) * triangle.area;
-            for k in 0..3 {
-                if let Some(force) = rhs.get_mut(face[k] as usize) {
-                    let along = pull * triangle.gradient[k];
+            for (v, gradient) in face.iter().zip(&triangle.gradient) {
+                if let Some(force) = rhs.get_mut(*v as usize) {
+                    let along = pull * gradient;
                     (0..3).for_each(|d| force[d] += along[d]);
                 }
             }

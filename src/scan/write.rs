@@ -45,6 +45,9 @@ pub enum PatchPoint {
     New(Vec3),
 }
 
+/// How far the squared length of a stored normal may be from 1; the validator allows about half of it.
+const UNIT: f32 = 1e-3;
+
 const RECONSTRUCTION: &str = "darn reconstruction";
 
 pub(super) fn write(scan: &Scan, additions: &[Addition]) -> Result<Vec<u8>, ScanError> {
@@ -310,14 +313,15 @@ impl<'s> Patch<'s> {
             .collect()
     }
 
-    /// The scan's normal at a patch point that is one of the look's own vertices, unless it is zero.
+    /// The scan's normal at a patch point that is one of the look's own vertices, if it is one (of unit length).
     fn stored_normal(&self, point: &PatchPoint) -> Option<[f32; 3]> {
         let PatchPoint::Scan(vertex) = *point else {
             return None;
         };
         let at = vertex.checked_sub(self.look.vertices.start)? as usize;
         let stored = *self.look.normals.as_ref()?.get(at)?;
-        (self.look.node == self.home.node && stored != [0.0; 3]).then_some(stored)
+        let unit = (stored.iter().map(|x| x * x).sum::<f32>() - 1.0).abs() < UNIT;
+        (self.look.node == self.home.node && unit).then_some(stored)
     }
 
     /// Appends the triangles, turned round where the node's transform will turn them again.

@@ -83,15 +83,50 @@ fn the_outer_boundary_is_never_filled() {
 }
 
 #[test]
-fn a_scan_without_holes_comes_back_as_it_was() {
+fn a_scan_without_holes_is_refused_and_its_loops_are_named() {
     let none = Hole::Circle {
         centre: darn::mesh::Vec2::new(0.5, 0.5),
         radius: 0.0,
     };
     let bytes = packed(&holed(sheet(0), &none).mesh, &[]);
-    let mended = mended(&bytes, &Constraints::default()).unwrap();
-    assert!(mended.report.holes.is_empty());
-    assert!(mended.bytes == bytes);
+    let error = mended(&bytes, &Constraints::default()).unwrap_err();
+    assert_eq!(error.code(), "no_holes");
+    assert!(
+        error
+            .to_string()
+            .contains("loop 0 is left (the cloth's own edge"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_mesh_that_two_nodes_draw_is_mended_once() {
+    let bytes = packed(&holed(sheet(0), &ROUND).mesh, &[]);
+    let text = String::from_utf8_lossy(&bytes[20..]).into_owned();
+    let json_length = u32::from_le_bytes([bytes[12], bytes[13], bytes[14], bytes[15]]) as usize;
+    let json = text[..json_length]
+        .replace(
+            r#""scenes":[{"nodes":[0]}]"#,
+            r#""scenes":[{"nodes":[0,1]}]"#,
+        )
+        .replace(
+            r#""nodes":[{"mesh":0,"#,
+            r#""nodes":[{"mesh":0,"translation":[7,0,0]},{"mesh":0,"#,
+        );
+    let json = format!("{json:width$}", width = json.len().next_multiple_of(4));
+    let rest = &bytes[20 + json_length..];
+    let mut doubled = b"glTF\x02\0\0\0".to_vec();
+    doubled.extend((20 + json.len() as u32 + rest.len() as u32).to_le_bytes());
+    doubled.extend((json.len() as u32).to_le_bytes());
+    doubled.extend(b"JSON");
+    doubled.extend(json.as_bytes());
+    doubled.extend(rest);
+    let mended = mended(&doubled, &Constraints::default()).unwrap();
+    assert_eq!(mended.report.holes.len(), 1);
+    assert!(mended.report.skipped.iter().any(|s| s.code == "same_mesh"));
+    let after = Seen::of(&mended.bytes);
+    assert_eq!(after.loops.len(), 2, "both nodes show the one patch");
+    assert!(after.topology.non_manifold.is_empty());
 }
 
 #[test]
