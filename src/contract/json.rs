@@ -7,8 +7,8 @@
 use std::fmt;
 
 use serde::de::{
-    DeserializeOwned, DeserializeSeed, Deserializer, Error as _, IntoDeserializer, MapAccess,
-    SeqAccess, Visitor, value::StrDeserializer,
+    DeserializeOwned, DeserializeSeed, Deserializer, Error as _, Expected, IntoDeserializer,
+    MapAccess, SeqAccess, Unexpected, Visitor, value::StrDeserializer,
 };
 use serde_json::{Map, Value};
 
@@ -36,7 +36,7 @@ pub fn from_json<T: DeserializeOwned>(text: &[u8]) -> Result<T, JsonError> {
     let value: Value = serde_json::from_slice(text).map_err(|error| JsonError::Syntax {
         detail: error.to_string(),
     })?;
-    T::deserialize(Node(&value)).map_err(|fault| JsonError::Shape(fault.into_field_error()))
+    T::deserialize(Node::bare(&value)).map_err(|fault| JsonError::Shape(fault.into_field_error()))
 }
 
 /// A fault and the way to it, innermost step first.
@@ -80,16 +80,72 @@ impl serde::de::Error for Fault {
             steps: Vec::new(),
         }
     }
+
+    /// In the words of JSON; serde's are Rust's.
+    fn invalid_type(unexpected: Unexpected<'_>, expected: &dyn Expected) -> Self {
+        let got = match unexpected {
+            Unexpected::Unit | Unexpected::Option => "null".to_owned(),
+            Unexpected::Bool(flag) => flag.to_string(),
+            Unexpected::Unsigned(number) => format!("the number {number}"),
+            Unexpected::Signed(number) => format!("the number {number}"),
+            Unexpected::Float(number) => format!("the number {number}"),
+            Unexpected::Str(_) => "a string".to_owned(),
+            Unexpected::Seq => "an array".to_owned(),
+            Unexpected::Map => "an object".to_owned(),
+            other => other.to_string(),
+        };
+        let expected = expected.to_string();
+        let expected = match expected.as_str() {
+            "a sequence" => "an array",
+            text if text.starts_with("struct ") => "an object",
+            text => text,
+        };
+        Self::custom(format!("expected {expected}; got {got}"))
+    }
 }
 
 /// One value, read as it describes itself.
-struct Node<'v>(&'v Value);
+struct Node<'v> {
+    value: &'v Value,
+    /// What null is here: in proto3 JSON a field that is null is absent; anywhere else null is itself.
+    null: Null,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Null {
+    Itself,
+    Absent,
+}
+
+impl<'v> Node<'v> {
+    fn bare(value: &'v Value) -> Self {
+        let null = Null::Itself;
+        Self { value, null }
+    }
+
+    fn field(value: &'v Value) -> Self {
+        let null = Null::Absent;
+        Self { value, null }
+    }
+
+    fn is_absent(&self) -> bool {
+        self.value.is_null() && self.null == Null::Absent
+    }
+}
+
+/// The natural or negative number a real one equals: proto3 JSON lets an integer be written `1.0`. Beyond 2^53 a real number
+/// no longer tells which integer is meant.
+fn whole(real: f64) -> Option<i64> {
+    let exact = real.fract() == 0.0 && real.abs() <= 9_007_199_254_740_992.0;
+    // Minus zero is no integer.
+    (exact && !(real == 0.0 && real.is_sign_negative())).then_some(real as i64)
+}
 
 impl<'de> Deserializer<'de> for Node<'_> {
     type Error = Fault;
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
-        match self.0 {
+        match self.value {
             Value::Null => visitor.visit_unit(),
             Value::Bool(flag) => visitor.visit_bool(*flag),
             Value::String(text) => visitor.visit_str(text),
@@ -99,7 +155,13 @@ impl<'de> Deserializer<'de> for Node<'_> {
                 } else if let Some(integer) = number.as_i64() {
                     visitor.visit_i64(integer)
                 } else if let Some(real) = number.as_f64() {
-                    visitor.visit_f64(real)
+                    match whole(real) {
+                        Some(integer) => match u64::try_from(integer) {
+                            Ok(natural) => visitor.visit_u64(natural),
+                            Err(_) => visitor.visit_i64(integer),
+                        },
+                        None => visitor.visit_f64(real),
+                    }
                 } else {
                     Err(Fault::custom("the number is out of range"))
                 }
@@ -116,10 +178,27 @@ impl<'de> Deserializer<'de> for Node<'_> {
     }
 
     fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
-        match self.0 {
+        match self.value {
             Value::Null => visitor.visit_none(),
             _ => visitor.visit_some(self),
         }
+    }
+
+    fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        if self.is_absent() {
+            return visitor.visit_seq(Items {
+                rest: [].iter(),
+                index: 0,
+            });
+        }
+        self.deserialize_any(visitor)
+    }
+
+    fn deserialize_bool<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        if self.is_absent() {
+            return visitor.visit_bool(false);
+        }
+        self.deserialize_any(visitor)
     }
 
     fn deserialize_newtype_struct<V: Visitor<'de>>(
@@ -131,8 +210,8 @@ impl<'de> Deserializer<'de> for Node<'_> {
     }
 
     serde::forward_to_deserialize_any! {
-        bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct
-        seq tuple tuple_struct map struct enum identifier ignored_any
+        i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct
+        tuple tuple_struct map struct enum identifier ignored_any
     }
 }
 
@@ -153,7 +232,7 @@ impl<'de> SeqAccess<'de> for Items<'_> {
         };
         let index = self.index;
         self.index += 1;
-        seed.deserialize(Node(value))
+        seed.deserialize(Node::bare(value))
             .map(Some)
             .map_err(|fault| fault.under(index.to_string()))
     }
@@ -190,7 +269,7 @@ impl<'de> MapAccess<'de> for Fields<'_> {
             .pending
             .take()
             .ok_or_else(|| Fault::custom("a value without its name"))?;
-        seed.deserialize(Node(value))
+        seed.deserialize(Node::field(value))
             .map_err(|fault| fault.under(key))
     }
 }
@@ -254,6 +333,44 @@ mod tests {
         );
         assert_eq!(fault("[1]").0, "");
         assert!(fault(r#"{"hole": []}"#).1.contains("unknown field"));
+    }
+
+    #[test]
+    fn null_is_absent_and_integers_may_have_a_point() {
+        let text = r#"{"holes": null, "anchors": [{"hole": 2.0, "uv": null, "position": [1.0, -2.0, 5e-1], "hard": null}],
+            "edits": null, "weights": null, "up": null}"#;
+        let read: v1::Constraints = from_json(text.as_bytes()).unwrap();
+        let anchor = v1::Anchor {
+            hole: Some(2),
+            position: vec![1.0, -2.0, 0.5],
+            ..Default::default()
+        };
+        let expected = v1::Constraints {
+            anchors: vec![anchor],
+            ..Default::default()
+        };
+        assert_eq!(read, expected);
+        let edit =
+            r#"{"edits": [{"grab": null, "hole": null}], "holes": [{"cut": null, "id": 1e1}]}"#;
+        let read: v1::Constraints = from_json(edit.as_bytes()).unwrap();
+        assert_eq!((read.edits[0].hole, read.holes[0].id), (None, Some(10)));
+
+        for (text, at) in [
+            (r#"{"hole": null}"#, "/hole"),
+            (r#"{"holes": [null]}"#, "/holes/0"),
+            (r#"{"holes": [{"id": 1.5}]}"#, "/holes/0/id"),
+            (r#"{"holes": [{"id": -1.0}]}"#, "/holes/0/id"),
+        ] {
+            assert_eq!(fault(text).0, at, "{text}");
+        }
+        assert_eq!(
+            fault("null"),
+            (String::new(), "expected an object; got null".into())
+        );
+        assert_eq!(
+            fault(r#"{"holes": 7}"#).1,
+            "expected an array; got the number 7"
+        );
     }
 
     #[test]

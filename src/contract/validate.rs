@@ -12,7 +12,7 @@ const LATER: &str = "not served by this version yet";
 
 /// One field of a request and what is wrong with it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{pointer}: {detail}")]
+#[error("{pointer}{}{detail}", if .pointer.is_empty() { "" } else { ": " })]
 pub struct FieldError {
     /// JSON pointer (RFC 6901) into the constraints; empty for the whole.
     pub pointer: String,

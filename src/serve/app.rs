@@ -9,13 +9,16 @@ use std::{
     time::Duration,
 };
 
-use tokio::time::Instant;
+use tokio::{
+    sync::{OwnedSemaphorePermit, Semaphore},
+    time::Instant,
+};
 use tracing::error;
 
 use super::{
     config::ServeArgs,
     errors::{Class, Menders, Refusal},
-    pool::{Admission, Pool, PoolError},
+    pool::{Pool, PoolError},
     problem::Fault,
     telemetry::Metrics,
 };
@@ -29,10 +32,19 @@ pub struct App {
     /// Web pages that may call, by origin; `*` for any.
     pub allow_origin: Vec<String>,
     pool: Pool,
+    /// Bodies that may still be received at once.
+    uploads: Arc<Semaphore>,
     menders: Arc<dyn Menders>,
     warm: AtomicBool,
     draining: AtomicBool,
 }
+
+/// The right to receive a body and to be put into the queue with it; free again when dropped.
+///
+/// Apart from the places in the queue: a body that does not come on costs nobody a place. Bodies in memory are at most
+/// uploads, waiting and running jobs together, each of at most the body limit; a multipart one twice while it is split.
+#[derive(Debug)]
+pub struct Upload(#[allow(dead_code, reason = "held for its drop")] OwnedSemaphorePermit);
 
 /// What a request may cost.
 #[derive(Debug, Clone, Copy)]
@@ -43,6 +55,8 @@ pub struct Limits {
     pub body: usize,
     /// Between two pieces of a body.
     pub body_pause: Duration,
+    /// Bodies received at once.
+    pub uploads: usize,
 }
 
 impl std::fmt::Debug for App {
@@ -68,9 +82,11 @@ impl App {
                 deadline: settings.deadline,
                 body: settings.body_limit,
                 body_pause: settings.body_timeout,
+                uploads: settings.uploads(),
             },
             allow_origin: settings.allow_origin.clone(),
             pool,
+            uploads: Arc::new(Semaphore::new(settings.uploads())),
             menders,
             warm: AtomicBool::new(false),
             draining: AtomicBool::new(false),
@@ -82,47 +98,60 @@ impl App {
     /// # Errors
     /// The mend's, or that of the pool.
     pub async fn warm_up(&self) -> Result<(), Fault> {
-        let admission = self.admit()?;
         let patience = Duration::from_secs(3600);
-        self.work(admission, patience, |menders| menders.warm_up())
+        self.work(None, patience, |menders| menders.warm_up())
             .await?;
         self.warm.store(true, Relaxed);
         Ok(())
     }
 
-    /// Takes a place in the queue, before the body is read: so places bound memory, too.
+    /// Takes the right to receive a body; before it is read, and only while the queue has room for it.
     ///
     /// # Errors
-    /// `QueueFull` or `Draining`.
-    pub fn admit(&self) -> Result<Admission, Fault> {
-        self.pool
-            .admit()
-            .map_err(|error| self.fault(error, self.limits.deadline))
+    /// `UploadsFull`, `QueueFull` or `Draining`.
+    pub fn upload(&self) -> Result<Upload, Fault> {
+        let permit = Arc::clone(&self.uploads).try_acquire_owned();
+        // Asked after the permit was taken: who has one from before the drain is waited for.
+        if self.draining.load(Relaxed) {
+            return Err(Fault::Draining);
+        }
+        let upload = permit.map(Upload).map_err(|_| Fault::UploadsFull {
+            limit: self.limits.uploads,
+            retry_after: self.limits.body_pause.as_secs().clamp(1, 60),
+        })?;
+        (self.pool.room()).map_err(|error| self.fault(error, self.limits.deadline))?;
+        Ok(upload)
     }
 
-    /// Runs a job on a worker, within the deadline.
+    /// Takes a place in the queue and runs a job on a worker, within the deadline.
     ///
     /// # Errors
-    /// The job's, `Deadline`, `Draining`, or `Internal` when it panicked.
+    /// The job's, `QueueFull`, `Deadline`, `Draining`, or `Internal` when it panicked.
     pub async fn submit<T: Send + 'static>(
         &self,
-        admission: Admission,
+        upload: Upload,
         job: impl FnOnce(&dyn Menders) -> Result<T, Refusal> + Send + 'static,
     ) -> Result<T, Fault> {
-        self.work(admission, self.limits.deadline, job).await
+        self.work(Some(upload), self.limits.deadline, job).await
     }
 
     async fn work<T: Send + 'static>(
         &self,
-        admission: Admission,
+        upload: Option<Upload>,
         patience: Duration,
         job: impl FnOnce(&dyn Menders) -> Result<T, Refusal> + Send + 'static,
     ) -> Result<T, Fault> {
         let menders = Arc::clone(&self.menders);
-        let outcome = self
-            .pool
-            .run(admission, Instant::now() + patience, move || job(&*menders))
-            .await;
+        let outcome = match self.pool.admit() {
+            Ok(admission) => {
+                let deadline = Instant::now() + patience;
+                let answer = (self.pool).run(admission, deadline, move || job(&*menders));
+                // Not before the job is in the queue, which a drain closes when no upload is left.
+                drop(upload);
+                answer.await
+            }
+            Err(error) => Err(error),
+        };
         match outcome {
             Ok(Ok(value)) => Ok(value),
             Ok(Err(refusal)) => {
@@ -172,8 +201,17 @@ impl App {
         }
     }
 
-    /// Stops being ready and takes no more jobs; those taken go on.
-    pub fn drain(&self) {
+    /// Stops being ready and takes no more requests; those whose bodies are still coming, and jobs taken, go on.
+    pub async fn drain(&self) {
+        self.draining.store(true, Relaxed);
+        let all = u32::try_from(self.limits.uploads).unwrap_or(u32::MAX);
+        // Never closed, so never an error.
+        self.uploads.acquire_many(all).await.ok();
+        self.pool.close();
+    }
+
+    /// Takes no more jobs at all.
+    pub fn close(&self) {
         self.draining.store(true, Relaxed);
         self.pool.close();
     }

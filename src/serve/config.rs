@@ -1,10 +1,13 @@
 //! Settings: a flag, or a `DARN_*` variable, and nothing else. All are parsed before anything is bound.
 
-use std::{net::SocketAddr, path::PathBuf, time::Duration};
+use std::{net::SocketAddr, ops::RangeInclusive, path::PathBuf, time::Duration};
 
 use clap::{Args, ValueEnum};
 
 use super::telemetry::LogFormat;
+
+/// Most jobs that may wait, and most bodies received at once.
+const MOST_WAITING: usize = 65_536;
 
 /// Serve HTTP and gRPC.
 #[derive(Debug, Clone, Args)]
@@ -22,13 +25,18 @@ pub struct ServeArgs {
     #[arg(long, env = "DARN_GRPC_LISTEN", value_name = "ADDRESS")]
     pub grpc_listen: Option<SocketAddr>,
 
-    /// Scans mended at once; left out, one per processor
-    #[arg(long, env = "DARN_WORKERS", value_name = "N", value_parser = count)]
+    /// Scans mended at once, at most 1024; left out, one per processor
+    #[arg(long, env = "DARN_WORKERS", value_name = "N", value_parser = workers)]
     pub workers: Option<usize>,
 
-    /// Scans that may wait for a worker; more are refused with 503
-    #[arg(long, env = "DARN_QUEUE", value_name = "N", default_value = "32", value_parser = count_or_none)]
+    /// Scans that may wait for a worker, at most 65536; more are refused with 503
+    #[arg(long, env = "DARN_QUEUE", value_name = "N", default_value = "32", value_parser = queue)]
     pub queue: usize,
+
+    /// Requests whose bodies are received at once; left out, four times workers and queue together. Bodies take at most this
+    /// plus workers plus queue times the body limit of memory
+    #[arg(long, env = "DARN_UPLOADS", value_name = "N", value_parser = uploads)]
+    pub uploads: Option<usize>,
 
     /// Longest time a scan may wait and be mended, such as 30s or 500ms
     #[arg(long, env = "DARN_DEADLINE", value_name = "TIME", default_value = "60s", value_parser = duration)]
@@ -50,12 +58,13 @@ pub struct ServeArgs {
     #[arg(long, env = "DARN_MAX_FACES", value_name = "N", default_value = "4000000", value_parser = count)]
     pub max_faces: usize,
 
-    /// Origins of web pages that may call the service; `*` for any
+    /// Origins of web pages that may call the service, such as https://example.org; `*` for any
     #[arg(
         long,
         env = "DARN_ALLOW_ORIGIN",
         value_name = "ORIGIN",
-        value_delimiter = ','
+        value_delimiter = ',',
+        value_parser = origin
     )]
     pub allow_origin: Vec<String>,
 
@@ -102,6 +111,58 @@ impl ServeArgs {
             std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
         })
     }
+
+    /// Bodies received at once: as set, else a few times what is mended and waits.
+    pub fn uploads(&self) -> usize {
+        self.uploads
+            .unwrap_or_else(|| (4 * (self.workers() + self.queue)).min(MOST_WAITING))
+    }
+}
+
+fn workers(text: &str) -> Result<usize, String> {
+    within(text, 1..=1024)
+}
+
+fn queue(text: &str) -> Result<usize, String> {
+    within(text, 0..=MOST_WAITING)
+}
+
+fn uploads(text: &str) -> Result<usize, String> {
+    within(text, 1..=MOST_WAITING)
+}
+
+fn within(text: &str, range: RangeInclusive<usize>) -> Result<usize, String> {
+    match text.parse() {
+        Ok(number) if range.contains(&number) => Ok(number),
+        _ => Err(format!(
+            "must be a whole number from {} to {}",
+            range.start(),
+            range.end()
+        )),
+    }
+}
+
+/// `*`, or scheme://host with an optional port, as a browser writes it: in small letters and without a path.
+fn origin(text: &str) -> Result<String, String> {
+    let text = text.trim();
+    let is_origin = || {
+        let (scheme, host) = text.split_once("://")?;
+        let mut letters = scheme.bytes();
+        let scheme = letters.next()?.is_ascii_alphabetic()
+            && letters.all(|b| b.is_ascii_alphanumeric() || b"+-.".contains(&b));
+        let plain = |b: u8| b.is_ascii_alphanumeric() || b"-._:[]".contains(&b);
+        let (name, port) = match host.rsplit_once(':') {
+            Some((name, port)) if !port.ends_with(']') => (name, Some(port)),
+            _ => (host, None),
+        };
+        let port = port.is_none_or(|port| port.parse::<u16>().is_ok());
+        Some(scheme && port && !name.is_empty() && name.bytes().all(plain))
+    };
+    if text == "*" || is_origin() == Some(true) {
+        Ok(text.to_ascii_lowercase())
+    } else {
+        Err("must be `*` or scheme://host, such as https://example.org, without a path".to_owned())
+    }
 }
 
 fn count(text: &str) -> Result<usize, String> {
@@ -110,11 +171,6 @@ fn count(text: &str) -> Result<usize, String> {
         Ok(count) => Ok(count),
         Err(_) => Err("must be a whole number".to_owned()),
     }
-}
-
-fn count_or_none(text: &str) -> Result<usize, String> {
-    text.parse()
-        .map_err(|_| "must be a whole number".to_owned())
 }
 
 /// `64MiB`, `512KiB`, `1GiB` or plain bytes.
@@ -199,8 +255,47 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert!(
-            error.contains("--workers") && error.contains("at least 1"),
+            error.contains("--workers") && error.contains("from 1 to 1024"),
             "{error}"
         );
+        for bad in [
+            ["--workers", "1025"],
+            ["--queue", "99999999999999999999"],
+            ["--queue", "65537"],
+            ["--uploads", "0"],
+        ] {
+            assert!(
+                Command::try_parse_from(["darn"].iter().chain(&bad)).is_err(),
+                "{bad:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn origins_are_those_a_browser_sends() {
+        for good in [
+            "*",
+            "https://example.org",
+            "http://localhost:3000",
+            "http://[::1]:80",
+        ] {
+            assert_eq!(origin(good).as_deref(), Ok(good));
+        }
+        assert_eq!(
+            origin("HTTPS://Example.org").as_deref(),
+            Ok("https://example.org")
+        );
+        for bad in [
+            "",
+            "example.org",
+            "https://",
+            "https://:80",
+            "https://example.org/",
+            "https://a b",
+            "https://example.org:port",
+            "://x",
+        ] {
+            assert!(origin(bad).is_err(), "{bad}");
+        }
     }
 }

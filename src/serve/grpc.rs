@@ -78,9 +78,9 @@ impl Darn for Door {
 
 impl Door {
     async fn holes(&self, stream: Streaming<ScanChunk>) -> Result<HolesReport, Fault> {
-        let Asked { scan, place, .. } = self.read(stream).await?.unconstrained()?;
+        let Asked { scan, upload, .. } = self.read(stream).await?.unconstrained()?;
         self.0
-            .submit(place, move |menders| menders.find_holes(&scan))
+            .submit(upload, move |menders| menders.find_holes(&scan))
             .await
     }
 
@@ -88,19 +88,19 @@ impl Door {
         let Asked {
             scan,
             constraints,
-            place,
+            upload,
         } = self.read(stream).await?;
         let constraints = constraints.unwrap_or_default();
         let mended = self
             .0
-            .submit(place, move |menders| menders.inpaint(&scan, &constraints))
+            .submit(upload, move |menders| menders.inpaint(&scan, &constraints))
             .await?;
         self.0.metrics.mended(&mended.report);
         Ok(mended)
     }
 
     async fn read(&self, mut stream: Streaming<ScanChunk>) -> Result<Asked, Fault> {
-        let place = self.0.admit()?;
+        let upload = self.0.upload()?;
         let limit = self.0.limits.body;
         let patience = Patience::new(&self.0.limits);
         let mut constraints = None;
@@ -136,7 +136,7 @@ impl Door {
         Ok(Asked {
             scan: scan.freeze(),
             constraints,
-            place,
+            upload,
         })
     }
 }

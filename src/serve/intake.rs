@@ -4,23 +4,31 @@ use std::{future::poll_fn, pin::Pin};
 
 use axum::{
     body::{Body, HttpBody},
-    extract::{FromRequest, Multipart, Request, multipart::MultipartError},
+    extract::{DefaultBodyLimit, FromRequest, Multipart, Request, multipart::MultipartError},
     http::{HeaderMap, header, request::Parts},
 };
 use bytes::{Bytes, BytesMut};
 use tokio::time::{Duration, Instant, timeout, timeout_at};
 
-use super::{app::Limits, pool::Admission, problem::Fault};
+use super::{
+    app::{Limits, Upload},
+    problem::Fault,
+};
 use crate::contract::{Constraints, FieldError, from_json, v1};
 
 /// Bytes of an unwanted body read on, as a multiple of the limit, so that the caller gets to see the answer.
 const DRAIN_FACTOR: u64 = 4;
 /// Longest time an unwanted body is read on.
-const DRAIN_TIME: Duration = Duration::from_secs(20);
+const DRAIN_TIME: Duration = Duration::from_secs(2);
 /// How many of the longest pauses a whole body may take.
 const PAUSES: u32 = 8;
 /// Largest constraints, in bytes.
 const CONSTRAINTS_LIMIT: usize = 1 << 20;
+/// What the body, and its part `scan`, may be sent as; for a person.
+const SCAN_MEDIA: &str = "model/gltf-binary, model/gltf+json or multipart/form-data";
+const SCAN_PART_MEDIA: &str = "model/gltf-binary or model/gltf+json";
+/// The same of the part `constraints`. `application/octet-stream` is read, too: it is what curl says of a file, and says nothing.
+const CONSTRAINTS_MEDIA: &str = "application/json";
 
 /// What a request carries.
 #[derive(Debug)]
@@ -29,8 +37,8 @@ pub struct Asked {
     pub scan: Bytes,
     /// The constraints, checked; none when none came.
     pub constraints: Option<Constraints>,
-    /// The place in the queue this request holds.
-    pub place: Admission,
+    /// The right to be put into the queue.
+    pub upload: Upload,
 }
 
 impl Asked {
@@ -84,23 +92,25 @@ enum Envelope {
     Multipart,
 }
 
-/// Reads a request whose headers have been accepted. The body is read to its end even when it is refused.
+/// Reads a request whose headers have been accepted.
 ///
 /// # Errors
-/// `UnsupportedMediaType`, `TooLarge`, `BodyTimeout`, `EmptyBody`, `Malformed` or `Constraints`.
-pub async fn asked(request: Request, place: Admission, limits: &Limits) -> Result<Asked, Fault> {
+/// `UnsupportedMediaType`, `ContentEncoding`, `TooLarge`, `ConstraintsTooLarge`, `BodyTimeout`, `EmptyBody`, `Malformed` or
+/// `Constraints`.
+pub async fn asked(request: Request, upload: Upload, limits: &Limits) -> Result<Asked, Fault> {
     let (parts, mut body) = request.into_parts();
     let read = async {
         let envelope = envelope(&parts.headers)?;
+        plain(&parts.headers)?;
         announced(&parts.headers, limits.body)?;
         Ok((envelope, read(&mut body, limits).await?))
     };
     let (envelope, bytes) = match read.await {
         Ok(read) => read,
         Err(fault) => {
-            drop(place);
+            drop(upload);
             if !matches!(fault, Fault::BodyTimeout { .. }) {
-                refuse(&parts.headers, body, limits).await;
+                refuse(&parts.headers, body, limits);
             }
             return Err(fault);
         }
@@ -115,18 +125,18 @@ pub async fn asked(request: Request, place: Admission, limits: &Limits) -> Resul
     Ok(Asked {
         scan,
         constraints,
-        place,
+        upload,
     })
 }
 
-/// Reads an unwanted body on, within bounds: a caller that is still sending would otherwise see a broken connection and
-/// not the answer. One that waits to be told to send is just not told.
-pub async fn refuse(headers: &HeaderMap, mut body: Body, limits: &Limits) {
+/// Reads an unwanted body on, within bounds and beside the answer, which does not wait for it: a caller that is still
+/// sending would otherwise see a broken connection and not the answer. One that waits to be told to send is just not told.
+pub fn refuse(headers: &HeaderMap, mut body: Body, limits: &Limits) {
     if headers.contains_key(header::EXPECT) {
         return;
     }
     let most = (limits.body as u64).saturating_mul(DRAIN_FACTOR);
-    let drained = async {
+    let drained = async move {
         let mut seen = 0;
         while let Some(Ok(piece)) = piece(&mut body).await {
             seen += piece.len() as u64;
@@ -135,7 +145,7 @@ pub async fn refuse(headers: &HeaderMap, mut body: Body, limits: &Limits) {
             }
         }
     };
-    timeout(DRAIN_TIME, drained).await.ok();
+    tokio::spawn(timeout(DRAIN_TIME, drained));
 }
 
 fn envelope(headers: &HeaderMap) -> Result<Envelope, Fault> {
@@ -158,8 +168,24 @@ fn envelope(headers: &HeaderMap) -> Result<Envelope, Fault> {
             } else {
                 format!("`{}`", cut(got, 100))
             },
+            send: SCAN_MEDIA,
         }),
     }
+}
+
+/// Refuses a compressed body: it would be read as a broken scan.
+fn plain(headers: &HeaderMap) -> Result<(), Fault> {
+    for value in headers.get_all(header::CONTENT_ENCODING) {
+        let got = value.to_str().unwrap_or("(not text)");
+        let foreign = |coding: &str| {
+            let coding = coding.trim();
+            !coding.is_empty() && !coding.eq_ignore_ascii_case("identity")
+        };
+        if got.split(',').any(foreign) {
+            return Err(Fault::ContentEncoding { got: cut(got, 100) });
+        }
+    }
+    Ok(())
 }
 
 fn announced(headers: &HeaderMap, limit: usize) -> Result<(), Fault> {
@@ -202,7 +228,9 @@ async fn split(parts: Parts, bytes: Bytes) -> Result<(Bytes, Option<Constraints>
     let malformed = |error: MultipartError| {
         Fault::Malformed(format!("the multipart body: {}", error.body_text()))
     };
-    let request = Request::from_parts(parts, Body::from(bytes));
+    let mut request = Request::from_parts(parts, Body::from(bytes));
+    // axum's own limit is 2 MB; ours was applied when the bytes came.
+    DefaultBodyLimit::disable().apply(&mut request);
     let mut form = (Multipart::from_request(request, &()).await).map_err(|rejection| {
         Fault::Malformed(format!("the multipart body: {}", rejection.body_text()))
     })?;
@@ -218,16 +246,21 @@ async fn split(parts: Parts, bytes: Bytes) -> Result<(Bytes, Option<Constraints>
                 .trim()
                 .to_ascii_lowercase()
         });
-        let (slot, read): (_, &[&str]) = match name.as_str() {
+        let (slot, send, read): (_, _, &[&str]) = match name.as_str() {
             "scan" => (
                 &mut scan,
+                SCAN_PART_MEDIA,
                 &[
                     "model/gltf-binary",
                     "model/gltf+json",
                     "application/octet-stream",
                 ],
             ),
-            "constraints" => (&mut constraints, &["application/json"]),
+            "constraints" => (
+                &mut constraints,
+                CONSTRAINTS_MEDIA,
+                &["application/json", "application/octet-stream"],
+            ),
             _ => {
                 let name = cut(&name, 100);
                 return Err(Fault::Malformed(format!(
@@ -238,6 +271,7 @@ async fn split(parts: Parts, bytes: Bytes) -> Result<(Bytes, Option<Constraints>
         if let Some(media) = media.filter(|media| !read.contains(&media.as_str())) {
             return Err(Fault::UnsupportedMediaType {
                 got: format!("`{}` of part `{name}`", cut(&media, 100)),
+                send,
             });
         }
         if slot
@@ -253,8 +287,10 @@ async fn split(parts: Parts, bytes: Bytes) -> Result<(Bytes, Option<Constraints>
 
 fn parse(text: &[u8]) -> Result<Constraints, Fault> {
     if text.len() > CONSTRAINTS_LIMIT {
-        let detail = format!("{} bytes; the limit is {CONSTRAINTS_LIMIT}", text.len());
-        return Err(Fault::Constraints(vec![FieldError::new("", detail)]));
+        return Err(Fault::ConstraintsTooLarge {
+            bytes: text.len(),
+            limit: CONSTRAINTS_LIMIT,
+        });
     }
     let message: v1::Constraints = from_json(text)?;
     Constraints::check(&message).map_err(Fault::Constraints)

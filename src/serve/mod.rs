@@ -62,9 +62,12 @@ pub fn run(settings: &ServeArgs, menders: Arc<dyn Menders>) -> Result<(), ServeE
     let outcome = runtime.block_on(async {
         let sockets = Sockets::bind(settings.listen, settings.grpc_listen).await?;
         let app = App::start(settings, menders)?;
-        let stop = CancellationToken::new();
-        shutdown::on_signal(stop.clone())?;
-        serve(sockets, app, stop, settings.drain).await
+        let (stop, now) = (CancellationToken::new(), CancellationToken::new());
+        shutdown::on_signal(stop.clone(), now.clone())?;
+        tokio::select! {
+            outcome = serve(sockets, app, stop, settings.drain) => outcome,
+            () = now.cancelled() => Ok(()),
+        }
     });
     // A mend that nobody waits for may still run; the process does not wait for it either.
     runtime.shutdown_background();
@@ -125,7 +128,7 @@ pub async fn serve(
         let (app, stop) = (Arc::clone(&app), stop.clone());
         async move {
             stop.cancelled().await;
-            app.drain();
+            app.drain().await;
         }
     });
 
@@ -164,7 +167,7 @@ pub async fn serve(
     } else {
         warm_up.abort();
     }
-    app.drain();
+    app.close();
     info!(early = stopped_early, "stopped");
     outcome.unwrap_or(Ok(())).map_err(ServeError::Io)
 }

@@ -56,7 +56,11 @@ fn inpaint() -> Value {
         "summary": "Fill the holes of a scan",
         "operationId": "inpaint",
         "requestBody": body(&[("constraints", "Constraints")]),
-        "responses": responses(filled),
+        "responses": responses(
+            filled,
+            "A scan or constraints that cannot be mended; `errors` names the constraints. With code `no_holes`: the scan has no \
+                hole to fill",
+        ),
     })
 }
 
@@ -69,7 +73,7 @@ fn holes() -> Value {
         "summary": "Find the boundary loops of a scan, and which of them are holes",
         "operationId": "findHoles",
         "requestBody": body(&[]),
-        "responses": responses(found),
+        "responses": responses(found, "A scan whose holes cannot be found, or constraints, which are not taken here"),
     })
 }
 
@@ -78,7 +82,7 @@ fn body(beside: &[(&str, &str)]) -> Value {
     let mut encoding = json!({ "scan": { "contentType": "model/gltf-binary, model/gltf+json, application/octet-stream" } });
     for (part, schema) in beside {
         parts[*part] = reference(schema);
-        encoding[*part] = json!({ "contentType": "application/json" });
+        encoding[*part] = json!({ "contentType": "application/json, application/octet-stream" });
     }
     json!({
         "required": true,
@@ -93,7 +97,7 @@ fn body(beside: &[(&str, &str)]) -> Value {
     })
 }
 
-fn responses(success: Value) -> Value {
+fn responses(success: Value, unprocessable: &str) -> Value {
     let mut all = Map::from_iter([("200".to_owned(), success)]);
     for (status, description) in [
         (
@@ -105,18 +109,18 @@ fn responses(success: Value) -> Value {
             "413",
             "Larger than a limit of the service; the limit is named",
         ),
-        ("415", "A content type that is not read here"),
         (
-            "422",
-            "A scan or constraints that cannot be mended; `errors` names the constraints",
+            "415",
+            "A content type or a content encoding that is not read here",
         ),
+        ("422", unprocessable),
         (
             "500",
             "An error of the service; its log has it under the request id",
         ),
         (
             "503",
-            "The queue is full or the service shuts down; `retry-after` says when to come back",
+            "The queue is full, too many requests are being received, or the service shuts down; `retry-after` says when to come back",
         ),
         ("504", "Waiting and mending took longer than the deadline"),
     ] {
@@ -162,10 +166,10 @@ fn problem_schema() -> Value {
                 "items": {
                     "type": "object",
                     "properties": {
-                        "pointer": { "type": "string", "description": "JSON pointer (RFC 6901) into the constraints" },
+                        "pointer": { "type": "string", "description": "JSON pointer (RFC 6901) into the constraints; absent when they are at fault as a whole" },
                         "detail": { "type": "string" },
                     },
-                    "required": ["pointer", "detail"],
+                    "required": ["detail"],
                 },
             },
         },

@@ -112,7 +112,24 @@ impl Pool {
         Ok(pool)
     }
 
-    /// Takes a place, before anything costly is done for the request.
+    /// Whether a place is free now; takes none.
+    ///
+    /// # Errors
+    /// `Full` with an estimate, or `Closed`.
+    pub fn room(&self) -> Result<(), PoolError> {
+        if self.0.lock().closed {
+            return Err(PoolError::Closed);
+        }
+        if self.0.places.available_permits() == 0 {
+            self.0.sweep();
+        }
+        match self.0.places.available_permits() {
+            0 => Err(self.0.full()),
+            _ => Ok(()),
+        }
+    }
+
+    /// Takes a place, for a job that is about to be run.
     ///
     /// # Errors
     /// `Full` with an estimate, or `Closed`.
@@ -130,28 +147,32 @@ impl Pool {
             .map_err(|_| self.0.full())
     }
 
-    /// Runs a job on a worker and waits for its result, until the deadline. Dropping the future skips the job if it has not begun.
+    /// Puts a job into the queue at once; the future waits for its result, until the deadline. Dropping it skips the job if it
+    /// has not begun.
     ///
     /// # Errors
     /// `Closed`, `Expired` or `Panicked`.
-    pub async fn run<T: Send + 'static>(
+    pub fn run<T: Send + 'static>(
         &self,
         admission: Admission,
         deadline: Instant,
         work: impl FnOnce() -> T + Send + 'static,
-    ) -> Result<T, PoolError> {
+    ) -> impl Future<Output = Result<T, PoolError>> {
         let (reply, answer) = oneshot::channel();
-        self.0.push(Box::new(Job {
+        let pushed = self.0.push(Box::new(Job {
             work,
             reply,
             deadline,
             entered: Instant::now(),
             span: Span::current(),
             admission,
-        }))?;
-        match timeout_at(deadline, answer).await {
-            Ok(Ok(outcome)) => outcome,
-            Ok(Err(_)) | Err(_) => Err(PoolError::Expired),
+        }));
+        async move {
+            pushed?;
+            match timeout_at(deadline, answer).await {
+                Ok(Ok(outcome)) => outcome,
+                Ok(Err(_)) | Err(_) => Err(PoolError::Expired),
+            }
         }
     }
 

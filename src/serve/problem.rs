@@ -47,11 +47,25 @@ pub enum Fault {
         /// The limit, in bytes.
         limit: usize,
     },
+    /// The constraints are larger than their own limit.
+    #[error("the part `constraints` has {bytes} bytes; its limit is {limit}")]
+    ConstraintsTooLarge {
+        /// What came.
+        bytes: usize,
+        /// The limit, in bytes.
+        limit: usize,
+    },
     /// The content type is none of ours.
-    #[error(
-        "content type {got} is not read here; send model/gltf-binary, model/gltf+json or multipart/form-data"
-    )]
+    #[error("content type {got} is not read here; send {send}")]
     UnsupportedMediaType {
+        /// What came.
+        got: String,
+        /// What would have been read.
+        send: &'static str,
+    },
+    /// The body is compressed.
+    #[error("content encoding `{got}` is not read here; send the body as it is")]
+    ContentEncoding {
         /// What came.
         got: String,
     },
@@ -74,6 +88,16 @@ pub enum Fault {
         /// Jobs running.
         running: usize,
         /// Estimated seconds until there is room.
+        retry_after: u64,
+    },
+    /// Too many bodies are being read.
+    #[error(
+        "{limit} requests are being received, which is all this service receives at once (DARN_UPLOADS); try again in {retry_after} s"
+    )]
+    UploadsFull {
+        /// Bodies read at once.
+        limit: usize,
+        /// Seconds after which trying again makes sense.
         retry_after: u64,
     },
     /// The service shuts down.
@@ -117,6 +141,16 @@ impl Fault {
                 "body_too_large",
                 Code::ResourceExhausted,
             ),
+            Self::ConstraintsTooLarge { .. } => Row(
+                S::PAYLOAD_TOO_LARGE,
+                "constraints_too_large",
+                Code::ResourceExhausted,
+            ),
+            Self::ContentEncoding { .. } => Row(
+                S::UNSUPPORTED_MEDIA_TYPE,
+                "unsupported_content_encoding",
+                Code::InvalidArgument,
+            ),
             Self::UnsupportedMediaType { .. } => Row(
                 S::UNSUPPORTED_MEDIA_TYPE,
                 "unsupported_media_type",
@@ -139,6 +173,9 @@ impl Fault {
             },
             Self::NotServed => Row(S::NOT_IMPLEMENTED, "not_served", Code::Unimplemented),
             Self::QueueFull { .. } => Row(S::SERVICE_UNAVAILABLE, "queue_full", Code::Unavailable),
+            Self::UploadsFull { .. } => {
+                Row(S::SERVICE_UNAVAILABLE, "uploads_full", Code::Unavailable)
+            }
             Self::Draining => Row(S::SERVICE_UNAVAILABLE, "draining", Code::Unavailable),
             Self::WarmingUp => Row(S::SERVICE_UNAVAILABLE, "warming_up", Code::Unavailable),
             Self::Deadline { .. } => Row(
@@ -170,7 +207,9 @@ impl Fault {
 
     fn retry_after(&self) -> Option<u64> {
         match self {
-            Self::QueueFull { retry_after, .. } => Some(*retry_after),
+            Self::QueueFull { retry_after, .. } | Self::UploadsFull { retry_after, .. } => {
+                Some(*retry_after)
+            }
             Self::Draining | Self::WarmingUp => Some(5),
             _ => None,
         }
@@ -202,6 +241,13 @@ impl Fault {
         headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
         if let Some(seconds) = self.retry_after() {
             headers.insert(header::RETRY_AFTER, HeaderValue::from(seconds));
+        }
+        if matches!(self, Self::ContentEncoding { .. }) {
+            // RFC 7694: what would have been read.
+            headers.insert(
+                header::ACCEPT_ENCODING,
+                HeaderValue::from_static("identity"),
+            );
         }
         let body = serde_json::to_vec(&self.document(request_id)).unwrap_or_default();
         let mut response = Response::new(Body::from(body));
@@ -268,6 +314,8 @@ pub struct Problem {
 
 #[derive(Debug, Clone, Serialize)]
 struct ProblemField {
+    /// Left out when the constraints as a whole are at fault.
+    #[serde(skip_serializing_if = "String::is_empty")]
     pointer: String,
     detail: String,
 }

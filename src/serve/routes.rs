@@ -115,11 +115,11 @@ async fn inpaint(State(app): State<Arc<App>>, request: Request) -> Result<Respon
     let Asked {
         scan,
         constraints,
-        place,
+        upload,
     } = admitted(&app, request).await?;
     let constraints = constraints.unwrap_or_default();
     let mended = app
-        .submit(place, move |menders| menders.inpaint(&scan, &constraints))
+        .submit(upload, move |menders| menders.inpaint(&scan, &constraints))
         .await?;
     app.metrics.mended(&mended.report);
     Ok(if in_parts {
@@ -130,19 +130,19 @@ async fn inpaint(State(app): State<Arc<App>>, request: Request) -> Result<Respon
 }
 
 async fn holes(State(app): State<Arc<App>>, request: Request) -> Result<Response, Fault> {
-    let Asked { scan, place, .. } = admitted(&app, request).await?.unconstrained()?;
+    let Asked { scan, upload, .. } = admitted(&app, request).await?.unconstrained()?;
     let report = app
-        .submit(place, move |menders| menders.find_holes(&scan))
+        .submit(upload, move |menders| menders.find_holes(&scan))
         .await?;
     Ok(Json(report).into_response())
 }
 
 async fn admitted(app: &App, request: Request) -> Result<Asked, Fault> {
-    match app.admit() {
-        Ok(place) => intake::asked(request, place, &app.limits).await,
+    match app.upload() {
+        Ok(upload) => intake::asked(request, upload, &app.limits).await,
         Err(fault) => {
             let (parts, body) = request.into_parts();
-            intake::refuse(&parts.headers, body, &app.limits).await;
+            intake::refuse(&parts.headers, body, &app.limits);
             Err(fault)
         }
     }

@@ -10,20 +10,26 @@ use tokio::{
 use tokio_util::sync::CancellationToken;
 use tracing::{info, warn};
 
-/// Cancels `stop` at the first SIGTERM or SIGINT.
+/// Cancels `stop` at the first SIGTERM or SIGINT, and `now` at the second: whoever asks twice does not want to wait.
 ///
 /// # Errors
 /// When the signals cannot be listened to.
-pub fn on_signal(stop: CancellationToken) -> io::Result<()> {
+pub fn on_signal(stop: CancellationToken, now: CancellationToken) -> io::Result<()> {
     let mut terminate = signal(SignalKind::terminate())?;
     let mut interrupt = signal(SignalKind::interrupt())?;
     tokio::spawn(async move {
-        let name = select! {
-            _ = terminate.recv() => "SIGTERM",
-            _ = interrupt.recv() => "SIGINT",
+        let mut next = async || {
+            select! {
+                _ = terminate.recv() => "SIGTERM",
+                _ = interrupt.recv() => "SIGINT",
+            }
         };
-        info!(signal = name, "shutting down");
+        let signal = next().await;
+        info!(signal, "shutting down");
         stop.cancel();
+        let signal = next().await;
+        warn!(signal, "ending at once");
+        now.cancel();
     });
     Ok(())
 }

@@ -16,10 +16,11 @@ use serde_json::Value;
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
+/// Settings as on the command line.
 #[derive(Parser)]
-struct Command {
+pub struct Settings {
     #[command(flatten)]
-    serve: ServeArgs,
+    pub serve: ServeArgs,
 }
 
 /// Mends nothing; a scan's text says what happens to it.
@@ -170,7 +171,7 @@ impl Service {
     /// Starts with settings as on the command line, and waits until it is ready.
     pub async fn start(settings: &[&str]) -> Self {
         let settings = [&["darn", "--listen", "127.0.0.1:0"], settings].concat();
-        let settings = Command::parse_from(settings).serve;
+        let settings = Settings::parse_from(settings).serve;
         let fake = Arc::new(Fake::default());
         let sockets = Sockets::bind(settings.listen, settings.grpc_listen)
             .await

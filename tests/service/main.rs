@@ -5,3 +5,5 @@ mod faults;
 mod harness;
 mod load;
 mod openapi;
+mod signals;
+mod uploads;

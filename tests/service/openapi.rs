@@ -46,6 +46,8 @@ fn every_reference_has_its_schema() {
             _ => {}
         }
     }
+    let unprocessable = &document["paths"]["/inpaint"]["post"]["responses"]["422"];
+    assert!(unprocessable.to_string().contains("no_holes"));
     assert!(schemas["HoleReport"]["properties"]["chart"]["$ref"].is_string());
     assert!(
         !schemas["Report"]["description"]

@@ -1,0 +1,93 @@
+//! Signals, sent to a service in a process of its own: this very test program, run again.
+
+use std::{
+    io::{Read, Write},
+    net::{SocketAddr, TcpListener, TcpStream},
+    process::{Child, Command, Stdio},
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use clap::Parser;
+use darn::serve::{healthcheck, run};
+
+use crate::harness::{Fake, Settings};
+
+const ADDRESS: &str = "DARN_TEST_SIGNALS_ADDRESS";
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Not a test: what the other process does.
+#[test]
+#[ignore = "run by the test of signals"]
+fn serves_until_signalled() {
+    if let Ok(address) = std::env::var(ADDRESS) {
+        let settings = ["darn", "--listen", &address, "--drain", "60s"];
+        let settings = Settings::parse_from(settings).serve;
+        run(&settings, Arc::new(Fake::default())).unwrap();
+    }
+}
+
+fn signal(child: &Child) {
+    let id = child.id().to_string();
+    let sent = Command::new("kill").args(["-TERM", &id]).status();
+    assert!(sent.unwrap().success());
+}
+
+fn metrics(address: SocketAddr) -> String {
+    let mut stream = TcpStream::connect(address).unwrap();
+    stream
+        .write_all(b"GET /metrics HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n")
+        .unwrap();
+    let mut text = String::new();
+    stream.read_to_string(&mut text).unwrap();
+    text
+}
+
+fn ends(child: &mut Child, within: Duration) -> bool {
+    let end = Instant::now() + within;
+    while Instant::now() < end {
+        if child.try_wait().unwrap().is_some() {
+            return true;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    false
+}
+
+#[test]
+fn a_second_signal_ends_the_service_at_once() {
+    let free = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address: SocketAddr = free.local_addr().unwrap();
+    drop(free);
+    let mut child = Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", "signals::serves_until_signalled", "--ignored"])
+        .env(ADDRESS, address.to_string())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let end = Instant::now() + PATIENCE;
+    while healthcheck(address, PATIENCE).is_err() {
+        assert!(Instant::now() < end, "the service never was ready");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+
+    // Work under way, which holds the drain.
+    let mut held = TcpStream::connect(address).unwrap();
+    held.write_all(b"POST /inpaint HTTP/1.1\r\nhost: x\r\ncontent-type: model/gltf-binary\r\ncontent-length: 4\r\n\r\nhold")
+        .unwrap();
+    while !metrics(address).contains("darn_jobs{state=\"running\"} 1") {
+        assert!(Instant::now() < end, "the work never began");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    signal(&child);
+    let early = ends(&mut child, Duration::from_millis(500));
+    if !early {
+        signal(&child);
+    }
+    let ended = ends(&mut child, PATIENCE);
+    child.kill().ok();
+    child.wait().unwrap();
+    assert!(!early, "one signal cut the work off");
+    assert!(ended, "the second signal did not end it");
+}

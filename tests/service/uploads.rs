@@ -1,0 +1,174 @@
+//! Bodies: how large, how slow, how many at once, and as what they are sent.
+
+use std::time::{Duration, Instant};
+
+use clap::Parser;
+use reqwest::multipart::{Form, Part};
+use tokio::{
+    io::{AsyncReadExt, AsyncWriteExt},
+    net::TcpStream,
+    time::timeout,
+};
+
+use crate::harness::{Service, Settings, problem};
+
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// A request of which `body` bytes are announced and three come.
+async fn stalled(service: &Service, body: u64) -> TcpStream {
+    let head = format!(
+        "POST /inpaint HTTP/1.1\r\nhost: x\r\ncontent-type: model/gltf-binary\r\ncontent-length: {body}\r\n\r\nclo"
+    );
+    let mut stream = TcpStream::connect(service.address).await.unwrap();
+    stream.write_all(head.as_bytes()).await.unwrap();
+    stream
+}
+
+/// The status line's first twelve bytes.
+async fn status(stream: &mut TcpStream) -> String {
+    let mut answer = [0; 12];
+    let read = timeout(PATIENCE, stream.read_exact(&mut answer)).await;
+    read.expect("no answer").unwrap();
+    String::from_utf8_lossy(&answer).into_owned()
+}
+
+fn form(scan: Vec<u8>, constraints: Vec<u8>, media: &str) -> Form {
+    let constraints = Part::bytes(constraints).file_name("c.json");
+    Form::new()
+        .part("scan", Part::bytes(scan))
+        .part("constraints", constraints.mime_str(media).unwrap())
+}
+
+#[tokio::test]
+async fn a_multipart_scan_may_be_as_large_as_a_bare_one() {
+    let service = Service::start(&["--body-limit", "8MiB"]).await;
+    let form = form(vec![7; 5 << 20], b"{}".to_vec(), "application/json");
+    let answer = service.post("/inpaint").multipart(form).send().await;
+    let answer = answer.unwrap();
+    assert_eq!(answer.status(), 200);
+    assert_eq!(answer.bytes().await.unwrap().len(), (5 << 20) + 5);
+}
+
+#[tokio::test]
+async fn constraints_have_a_limit_of_their_own() {
+    let service = Service::start(&[]).await;
+    let form = form(b"cloth".to_vec(), vec![b' '; 3 << 20], "application/json");
+    let answer = service.post("/inpaint").multipart(form).send().await;
+    let document = problem(answer.unwrap()).await;
+    insta::assert_snapshot!("constraints_too_large", format!("{document:#}"));
+}
+
+#[tokio::test]
+async fn constraints_are_read_as_curl_sends_a_file() {
+    let service = Service::start(&[]).await;
+    let send = async |constraints: &str, media| {
+        let form = form(b"cloth".to_vec(), constraints.into(), media);
+        let request = service.post("/inpaint").multipart(form);
+        request.send().await.unwrap()
+    };
+    let answer = send("{}", "application/octet-stream").await;
+    assert_eq!(answer.status(), 200);
+    let loose =
+        r#"{"holes": null, "anchors": [{"hole": 2.0, "uv": [0, 1.0], "position": [0, 0, 0]}]}"#;
+    assert_eq!(send(loose, "application/json").await.status(), 200);
+    let document = problem(send("{}", "text/plain").await).await;
+    insta::assert_snapshot!("constraints_media", format!("{document:#}"));
+    let document = problem(send("null", "application/json").await).await;
+    insta::assert_snapshot!("constraints_null", format!("{document:#}"));
+}
+
+#[tokio::test]
+async fn a_compressed_body_is_refused_as_such() {
+    let service = Service::start(&[]).await;
+    let plain = service.scan("cloth").header("content-encoding", "identity");
+    assert_eq!(plain.send().await.unwrap().status(), 200);
+    let packed = service.scan("cloth").header("content-encoding", "gzip");
+    let refused = packed.send().await.unwrap();
+    assert_eq!(refused.headers()["accept-encoding"], "identity");
+    insta::assert_snapshot!("compressed", format!("{:#}", problem(refused).await));
+}
+
+#[tokio::test]
+async fn a_body_announced_too_large_is_refused_at_once() {
+    let service = Service::start(&["--body-limit", "1KiB"]).await;
+    let begun = Instant::now();
+    let mut stream = stalled(&service, 1 << 40).await;
+    assert_eq!(status(&mut stream).await, "HTTP/1.1 413");
+    assert!(
+        begun.elapsed() < Duration::from_millis(1500),
+        "the answer waited for the body"
+    );
+}
+
+#[tokio::test]
+async fn stalled_uploads_cost_no_place_in_the_queue() {
+    let service = Service::start(&["--workers", "1", "--queue", "1"]).await;
+    let mut streams = Vec::new();
+    for _ in 0..6 {
+        streams.push(stalled(&service, 9).await);
+    }
+    // Nothing tells a test that the service has begun to read them, but time.
+    tokio::time::sleep(Duration::from_millis(200)).await;
+    assert_eq!(service.scan("cloth").send().await.unwrap().status(), 200);
+    streams[0].write_all(b"th 123").await.unwrap();
+    assert_eq!(status(&mut streams[0]).await, "HTTP/1.1 200");
+}
+
+#[tokio::test]
+async fn uploads_are_bounded_and_the_refusal_says_by_what() {
+    let service = Service::start(&["--uploads", "2"]).await;
+    let streams = [stalled(&service, 9).await, stalled(&service, 9).await];
+    let end = Instant::now() + PATIENCE;
+    let refused = loop {
+        let answer = service.scan("cloth").send().await.unwrap();
+        if answer.status() != 200 {
+            break answer;
+        }
+        assert!(Instant::now() < end, "nothing was refused");
+    };
+    assert!(refused.headers().contains_key("retry-after"));
+    insta::assert_snapshot!("uploads_full", format!("{:#}", problem(refused).await));
+    assert_eq!(service.get("/readyz").send().await.unwrap().status(), 200);
+
+    drop(streams);
+    while service.scan("cloth").send().await.unwrap().status() != 200 {
+        assert!(Instant::now() < end, "uploads given up keep their right");
+    }
+}
+
+#[tokio::test]
+async fn a_shutdown_waits_for_uploads_that_come_on_and_only_so_long_for_others() {
+    let service = Service::start(&["--body-timeout", "1s", "--drain", "60s"]).await;
+    let mut comes = stalled(&service, 9).await;
+    let mut stalls = stalled(&service, 9).await;
+    tokio::time::sleep(Duration::from_millis(100)).await;
+    service.stop.cancel();
+    tokio::time::sleep(Duration::from_millis(200)).await;
+    comes.write_all(b"th 123").await.unwrap();
+    assert_eq!(status(&mut comes).await, "HTTP/1.1 200");
+    assert_eq!(status(&mut stalls).await, "HTTP/1.1 408");
+    let ended = timeout(PATIENCE, service.ended).await;
+    ended.expect("the drain was held").unwrap().unwrap();
+}
+
+#[test]
+fn settings_out_of_bounds_are_refused_by_name() {
+    for (flag, value, said) in [
+        ("--workers", "100000000", "from 1 to 1024"),
+        ("--queue", "18446744073709551615", "from 0 to 65536"),
+        ("--uploads", "0", "from 1 to 65536"),
+        ("--allow-origin", "example.org", "scheme://host"),
+        (
+            "--allow-origin",
+            "https://a.org,https://b.org/",
+            "scheme://host",
+        ),
+    ] {
+        let refused = Settings::try_parse_from(["darn", flag, value]).err();
+        let text = refused.map(|error| error.to_string()).unwrap_or_default();
+        assert!(
+            text.contains(flag) && text.contains(said),
+            "{flag} {value}: {text}"
+        );
+    }
+}
