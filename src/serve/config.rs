@@ -58,7 +58,7 @@ pub struct ServeArgs {
     #[arg(long, env = "DARN_MAX_FACES", value_name = "N", default_value = "4000000", value_parser = count)]
     pub max_faces: usize,
 
-    /// Origins of web pages that may call the service, such as https://example.org; `*` for any
+    /// Origins of web pages that may call the service, such as `https://example.org`; `*` for any
     #[arg(
         long,
         env = "DARN_ALLOW_ORIGIN",
