@@ -162,12 +162,17 @@ impl Laid {
         })
     }
 
+    /// The rim as a polygon in uv.
+    fn rim_uv(&self) -> Vec<Vec2> {
+        let uv = |v: &u32| self.chart.uv(*v);
+        self.region.rim.iter().map(uv).collect()
+    }
+
     /// Larger side of the hole's box in the chart, scene units.
     fn hole_extent(&self) -> f64 {
-        let uvs = self.region.rim.iter().map(|v| self.chart.uv(*v));
-        let (low, high) = uvs.fold(
+        let (low, high) = self.rim_uv().iter().fold(
             (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY)),
-            |(low, high), uv| (low.inf(&uv), high.sup(&uv)),
+            |(low, high), uv| (low.inf(uv), high.sup(uv)),
         );
         (high - low).max() * self.chart.frame.side
     }
@@ -211,7 +216,7 @@ impl Laid {
 
     /// Sets each anchor's cell to its position and marks it known (soft: the network may not reach it).
     fn anchor(&self, grid: &mut Grid, anchors: &[(usize, Anchor)]) -> Result<(), MendError> {
-        let polygon: Vec<Vec2> = self.region.rim.iter().map(|v| self.chart.uv(*v)).collect();
+        let polygon = self.rim_uv();
         let mut wrong = Vec::new();
         for (i, anchor) in anchors {
             let cell = grid::cell_at(anchor.uv.into());
@@ -235,7 +240,7 @@ impl Laid {
 
     fn grid_report(&self, grid: &Grid, normal: &Normalisation) -> v1::GridReport {
         let spacing = grid::spacing(&grid.positions, |a, b| grid.known[a] && grid.known[b]);
-        let polygon: Vec<Vec2> = self.region.rim.iter().map(|v| self.chart.uv(*v)).collect();
+        let polygon = self.rim_uv();
         v1::GridReport {
             spacing_mean: normal.scale / grid::SIDE as f64,
             spacing_variance: spacing.variance / (spacing.mean * spacing.mean),
