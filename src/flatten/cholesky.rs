@@ -3,7 +3,7 @@
 
 use faer::linalg::solvers::SolveCore;
 use faer::sparse::linalg::solvers::Llt;
-use faer::sparse::{SparseColMat, Triplet};
+use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use faer::{Conj, Mat, Side};
 
 /// The matrix was not positive definite (or not finite).
@@ -14,7 +14,8 @@ pub(crate) struct NotPositive;
 #[derive(Debug, Default)]
 pub(crate) struct Symmetric {
     size: usize,
-    entries: Vec<Triplet<usize, usize, f64>>,
+    /// Row, column (not above the diagonal), value.
+    entries: Vec<(u32, u32, f64)>,
 }
 
 impl Symmetric {
@@ -28,7 +29,7 @@ impl Symmetric {
 
     /// Adds to the entry (i, j) and, by symmetry, (j, i).
     pub fn add(&mut self, i: usize, j: usize, value: f64) {
-        self.entries.push(Triplet::new(i.max(j), i.min(j), value));
+        self.entries.push((i.max(j) as u32, i.min(j) as u32, value));
     }
 
     /// Adds weight · (xᵢ − xⱼ)² to the quadratic form xᵀAx.
@@ -52,13 +53,55 @@ impl Symmetric {
     /// # Errors
     /// `NotPositive` when it is not positive definite.
     pub fn factor(&self) -> Result<Factor, NotPositive> {
-        let matrix = SparseColMat::try_new_from_triplets(self.size, self.size, &self.entries)
-            .map_err(|_| NotPositive)?;
+        let matrix = self.columns();
         let llt = matrix.sp_cholesky(Side::Lower).map_err(|_| NotPositive)?;
         Ok(Factor {
             llt,
             size: self.size,
         })
+    }
+
+    /// The lower triangle in compressed columns, entries at one place added up in the order they came.
+    fn columns(&self) -> SparseColMat<usize, f64> {
+        let mut starts = vec![0; self.size + 1];
+        for entry in &self.entries {
+            starts[entry.1 as usize + 1] += 1;
+        }
+        for column in 0..self.size {
+            starts[column + 1] += starts[column];
+        }
+        let mut fill = starts.clone();
+        let mut sorted = vec![(0, 0.0); self.entries.len()];
+        for &(row, column, value) in &self.entries {
+            sorted[fill[column as usize]] = (row, value);
+            fill[column as usize] += 1;
+        }
+        let (mut ends, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
+        // Where in `values` the current column's entry of a row is.
+        let mut place = vec![usize::MAX; self.size];
+        for s in starts.windows(2) {
+            let first = rows.len();
+            for &(row, value) in &sorted[s[0]..s[1]] {
+                let at = &mut place[row as usize];
+                if *at >= first && *at < values.len() {
+                    values[*at] += value;
+                } else {
+                    *at = values.len();
+                    rows.push(row as usize);
+                    values.push(value);
+                }
+            }
+            let mut column: Vec<(usize, f64)> = std::iter::zip(&rows[first..], &values[first..])
+                .map(|(r, v)| (*r, *v))
+                .collect();
+            column.sort_unstable_by_key(|entry| entry.0);
+            for (k, (row, value)) in column.into_iter().enumerate() {
+                (rows[first + k], values[first + k]) = (row, value);
+            }
+            ends.push(rows.len());
+        }
+        let pattern = SymbolicSparseColMat::new_checked(self.size, self.size, ends, None, rows);
+        SparseColMat::new(pattern, values)
     }
 }
 

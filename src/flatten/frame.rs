@@ -19,6 +19,7 @@ const DIRECTIONS: usize = 180;
 impl Frame {
     /// The smallest square, over `DIRECTIONS` rotations of a quarter turn, that holds all points; centred on them.
     pub fn tightest(points: &[Vec2]) -> Frame {
+        let points = &convex_hull(points)[..];
         let candidates = (0..DIRECTIONS).map(|k| {
             let angle = std::f64::consts::FRAC_PI_2 * k as f64 / DIRECTIONS as f64;
             Self::along(Vec2::new(angle.cos(), angle.sin()), points)
@@ -61,6 +62,27 @@ impl Frame {
         let up = Vec2::new(-self.axis.y, self.axis.x);
         self.origin + (self.axis * uv.x + up * uv.y) * self.side
     }
+}
+
+/// The corners of the convex hull, counter-clockwise (Andrew's monotone chain); points that are not finite are kept.
+fn convex_hull(points: &[Vec2]) -> Vec<Vec2> {
+    let mut sorted = points.to_vec();
+    sorted.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    let mut hull: Vec<Vec2> = Vec::new();
+    let mut chain = |points: &mut dyn Iterator<Item = &Vec2>| {
+        let first = hull.len();
+        for p in points {
+            while let [.., a, b] = hull[first..]
+                && (b - a).perp(&(p - b)) <= 0.0
+            {
+                hull.pop();
+            }
+            hull.push(*p);
+        }
+    };
+    chain(&mut sorted.iter());
+    chain(&mut sorted.iter().rev());
+    hull
 }
 
 #[cfg(test)]

@@ -28,7 +28,7 @@ impl Cloth {
         let welded = weld(&scan.surface);
         let weld = milliseconds(started);
         let started = Instant::now();
-        let topology = Topology::new(&welded.mesh);
+        let topology = welded.topology();
         let loops = boundary_loops(&welded.mesh, &topology);
         let timings = v1::ScanTimings {
             weld,

@@ -74,6 +74,10 @@ impl MendError {
             MendError::Constraints(_) => "constraints_do_not_fit",
             MendError::NoHoles { .. } => "no_holes",
             MendError::NonManifold { .. } => "non_manifold_rim",
+            MendError::Region {
+                source: RegionError::TooLarge { .. },
+                ..
+            } => "coordinates_too_large",
             MendError::Region { .. } => "not_a_disk",
             MendError::Flatten { .. } => "not_cloth_like",
             MendError::TooLittleKnown { .. } => "too_little_known",

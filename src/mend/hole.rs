@@ -8,6 +8,7 @@ use super::{MendError, Mender, dress, milliseconds};
 use crate::contract::{Anchor, FieldError, v1};
 use crate::flatten::{self, Chart};
 use crate::grid::{self, Grid, Normalisation};
+use crate::mesh::loops::BoundaryLoop;
 use crate::mesh::region::{self, Region};
 use crate::mesh::{Vec2, Vec3};
 use crate::patch::quality::{self, Quality};
@@ -22,6 +23,8 @@ const OFF: f64 = 1.3;
 const SMALLER: f64 = 0.6;
 /// Largest stretch of an edge, of chart or patch, that goes without a note.
 const SUSPICIOUS: f64 = 1.5;
+/// Reach of the collar that the extent of a hole is first read off, as a share of what suits a round one.
+const COLLAR: f64 = 0.2;
 /// Tries with smaller and smaller regions.
 const TRIES: usize = 4;
 
@@ -33,8 +36,7 @@ pub fn mend(
     mender: &Mender,
 ) -> Result<(Addition, v1::HoleReport), MendError> {
     let rim = &cloth.loops[chosen.id as usize];
-    // The reach that suits a round hole of this rim length; a ragged one is set right after the first chart.
-    let mut reach = reach_for(rim.length / std::f64::consts::PI);
+    let mut reach = reach_for(extent_at_a_glance(cloth, rim));
     let mut tries = 0;
     let (laid, patch, grid) = loop {
         let outcome = Laid::out(cloth, chosen.id, reach, mender).and_then(|laid| {
@@ -290,6 +292,23 @@ impl Laid {
 /// Reach of a region around a hole of this extent.
 fn reach_for(extent: f64) -> f64 {
     0.5 * extent * (1.0 / SHARE - 1.0)
+}
+
+/// Larger side of the hole's box in a chart of a narrow collar around it; where that cannot be laid flat, that of a round hole.
+fn extent_at_a_glance(cloth: &Cloth, rim: &BoundaryLoop) -> f64 {
+    let round = rim.length / std::f64::consts::PI;
+    let collar = region::grow(
+        &cloth.welded.mesh,
+        &cloth.topology,
+        &cloth.loops,
+        rim.id as usize,
+        COLLAR * reach_for(round),
+    );
+    let extent = collar.map(|collar| flatten::hole_extent(&collar));
+    match extent {
+        Ok(Ok(extent)) => extent,
+        _ => round,
+    }
 }
 
 /// Whether a smaller region may do better.

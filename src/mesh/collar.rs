@@ -1,10 +1,8 @@
 //! The turning a boundary loop is judged by, measured where noise and folds do not reach.
 
-use std::collections::{HashMap, HashSet};
-
 use super::curvature::angle_defect;
 use super::loops::turning;
-use super::topology::{NONE, Topology};
+use super::topology::{NONE, Topology, previous};
 use super::{TriMesh, Vec3};
 
 /// How often positions are averaged before the turning of a rough edge is measured.
@@ -24,9 +22,36 @@ pub(super) fn collar_turnings(
         .zip(cycles)
         .flat_map(|(l, cycle)| cycle.iter().map(move |&h| (topology.from(h), l)))
         .collect();
+    let mut roughness = vec![0.0; cycles.len()];
+    for &(v, l) in rings(topology, &edge, 1).iter().skip(1).flatten() {
+        if let Some(sum) = roughness.get_mut(l as usize) {
+            *sum += angle_defect(mesh, topology, v).abs();
+        }
+    }
+    let calm = |l: usize| roughness[l] < CALM;
+    let smooth = if (0..cycles.len()).all(calm) {
+        Vec::new()
+    } else {
+        smooth_turnings(mesh, topology, cycles, &edge)
+    };
+    (0..cycles.len())
+        .map(|l| match smooth.get(l) {
+            Some(&turning) if !calm(l) => turning,
+            _ => turning(mesh, topology, &cycles[l]),
+        })
+        .collect()
+}
+
+/// Per loop the mean turning of the curves behind it, on smoothed cloth; `edge` holds all boundary vertices and their loops.
+fn smooth_turnings(
+    mesh: &TriMesh,
+    topology: &Topology,
+    cycles: &[Vec<u32>],
+    edge: &[(u32, u32)],
+) -> Vec<f64> {
     let (first, last) = COLLAR;
     // What is smoothed SMOOTHING times is right as many rings from the last one that moves, and angles need one ring more.
-    let rings = rings(topology, &edge, SMOOTHING + last);
+    let rings = rings(topology, edge, SMOOTHING + last);
     let near: Vec<u32> = rings.iter().flatten().map(|claim| claim.0).collect();
     let smooth = smoothed(mesh, topology, &near);
     let mut collar: Vec<f64> = cycles
@@ -42,40 +67,20 @@ pub(super) fn collar_turnings(
             }
         }
     }
-    let mut roughness = vec![0.0; cycles.len()];
-    for &(v, l) in rings.iter().skip(1).take(1).flatten() {
-        if let Some(sum) = roughness.get_mut(l as usize) {
-            *sum += angle_defect(mesh, topology, v).abs();
-        }
-    }
-    cycles
-        .iter()
-        .zip(collar)
-        .zip(roughness)
-        .map(|((cycle, collar), roughness)| {
-            if roughness < CALM {
-                turning(mesh, topology, cycle)
-            } else {
-                collar
-            }
-        })
-        .collect()
+    collar
 }
 
 /// The vertices 0, 1, … `last` rings from the `edge`, each ascending and with the loop it is nearest to, [`NONE`] when two are as near.
 fn rings(topology: &Topology, edge: &[(u32, u32)], last: usize) -> Vec<Vec<(u32, u32)>> {
-    let mut seen: HashSet<u32> = edge.iter().map(|claim| claim.0).collect();
+    let mut seen = vec![false; topology.vertices()];
     let mut rings = vec![edge.to_vec()];
+    edge.iter().for_each(|claim| seen[claim.0 as usize] = true);
     for depth in 0..last {
         let mut claims: Vec<(u32, u32)> = Vec::new();
         for &(v, l) in &rings[depth] {
-            claims.extend(
-                topology
-                    .neighbours(v)
-                    .into_iter()
-                    .filter(|n| !seen.contains(n))
-                    .map(|n| (n, l)),
-            );
+            let around = topology.leaving(v).iter();
+            let around = around.flat_map(|&h| [topology.to(h), topology.from(previous(h))]);
+            claims.extend(around.filter(|&n| !seen[n as usize]).map(|n| (n, l)));
         }
         claims.sort_unstable();
         claims.dedup();
@@ -83,7 +88,7 @@ fn rings(topology: &Topology, edge: &[(u32, u32)], last: usize) -> Vec<Vec<(u32,
             .chunk_by(|a, b| a.0 == b.0)
             .map(|group| (group[0].0, if group.len() == 1 { group[0].1 } else { NONE }))
             .collect();
-        seen.extend(ring.iter().map(|claim| claim.0));
+        ring.iter().for_each(|claim| seen[claim.0 as usize] = true);
         rings.push(ring);
     }
     rings
@@ -92,32 +97,32 @@ fn rings(topology: &Topology, edge: &[(u32, u32)], last: usize) -> Vec<Vec<(u32,
 /// The mesh with the vertices `near` the boundary averaged [`SMOOTHING`] times with their neighbours: boundary vertices along the
 /// boundary only, so that loops stay loops.
 fn smoothed(mesh: &TriMesh, topology: &Topology, near: &[u32]) -> TriMesh {
-    let mut beside: HashMap<u32, Vec<u32>> = HashMap::new();
-    for h in (0..topology.twin.len() as u32).filter(|&h| topology.twin[h as usize] == NONE) {
-        beside
-            .entry(topology.from(h))
-            .or_default()
-            .push(topology.to(h));
-        beside
-            .entry(topology.to(h))
-            .or_default()
-            .push(topology.from(h));
+    // The neighbours of every vertex in one list, each up to the end named for it.
+    let (mut averaged, mut ends) = (Vec::new(), Vec::with_capacity(near.len()));
+    for &v in near {
+        let start = averaged.len();
+        for &h in topology.leaving(v) {
+            let back = previous(h);
+            let open = |h: u32| topology.twin[h as usize] == NONE;
+            averaged.extend(open(h).then(|| topology.to(h)));
+            averaged.extend(open(back).then(|| topology.from(back)));
+        }
+        if averaged.len() == start {
+            averaged.extend(topology.neighbours(v));
+        }
+        ends.push(averaged.len());
     }
-    let averaged: Vec<Vec<u32>> = near
-        .iter()
-        .map(|v| beside.remove(v).unwrap_or_else(|| topology.neighbours(*v)))
-        .collect();
     let mut out = mesh.clone();
+    let mut moved = Vec::with_capacity(near.len());
     for _ in 0..SMOOTHING {
-        let moved: Vec<Vec3> = near
-            .iter()
-            .zip(&averaged)
-            .map(|(&v, ring)| {
-                let sum: Vec3 = ring.iter().map(|&n| out.positions[n as usize]).sum();
-                (out.positions[v as usize] + sum / ring.len() as f64) * 0.5
-            })
-            .collect();
-        for (&v, p) in near.iter().zip(moved) {
+        let mut start = 0;
+        for (&v, &end) in near.iter().zip(&ends) {
+            let ring = &averaged[start..end];
+            let sum: Vec3 = ring.iter().map(|&n| out.positions[n as usize]).sum();
+            moved.push((out.positions[v as usize] + sum / ring.len() as f64) * 0.5);
+            start = end;
+        }
+        for (&v, p) in near.iter().zip(moved.drain(..)) {
             out.positions[v as usize] = p;
         }
     }

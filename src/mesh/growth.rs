@@ -4,7 +4,7 @@ use super::TriMesh;
 use super::geodesic::geodesic_distance_within;
 use super::loops::{BoundaryLoop, LoopKind, walk};
 use super::region::Region;
-use super::topology::{NONE, Sets, Topology, corner_fans, next};
+use super::topology::{NONE, Topology, corner_fans, previous};
 
 /// The smallest reach tried, in mean edge lengths of the rim's faces.
 const NARROWEST: f64 = 3.0;
@@ -92,47 +92,60 @@ impl<'a> Growth<'a> {
             .fold(0.0, f64::max)
     }
 
-    /// Groups the faces with `inside[f] == side` into edge-connected pieces: their smallest face stands for them.
-    fn pieces(&self, inside: &[bool], side: Side) -> Sets {
-        let mut sets = Sets::new(inside.len());
-        for h in self
-            .topology
-            .edges()
-            .filter(|&h| self.topology.twin[h as usize] != NONE)
-        {
-            let (f, g) = (h / 3, self.topology.twin[h as usize] / 3);
-            if side.has(inside[f as usize]) && side.has(inside[g as usize]) {
-                sets.join(f, g);
-            }
-        }
-        sets
+    /// The faces across the edges of a face.
+    fn beside(&self, face: u32) -> impl Iterator<Item = u32> + '_ {
+        let twins = &self.topology.twin[3 * face as usize..3 * face as usize + 3];
+        twins.iter().filter(|&&t| t != NONE).map(|t| t / 3)
     }
 
-    /// Keeps only the pieces that contain a face at the rim.
+    /// Keeps only what hangs together with the faces at the rim.
     fn drop_islands(&self, inside: &mut [bool]) {
-        let mut pieces = self.pieces(inside, Side::Inside);
         let mut keep = vec![false; inside.len()];
-        for &h in &self.rim.half_edges {
-            keep[pieces.find(h / 3) as usize] = true;
+        let mut open: Vec<u32> = self.rim.half_edges.iter().map(|h| h / 3).collect();
+        open.retain(|&f| inside[f as usize]);
+        while let Some(f) = open.pop() {
+            if !std::mem::replace(&mut keep[f as usize], true) {
+                open.extend(self.beside(f).filter(|&g| inside[g as usize]));
+            }
         }
-        for (f, inside) in inside.iter_mut().enumerate() {
-            *inside = *inside && keep[pieces.find(f as u32) as usize];
-        }
+        inside.copy_from_slice(&keep);
     }
 
     /// Takes in pieces of the rest of the component that the region surrounds: no deeper than `limit` and bounded by the region and
     /// holes alone.
     fn fill_pockets(&self, inside: &mut [bool], limit: f64) {
-        let mut pieces = self.pieces(inside, Side::Outside);
-        let mut open = vec![false; inside.len()];
-        for f in (0..inside.len()).filter(|&f| !inside[f]) {
-            let deep = self.depth(f) > limit;
-            let edge = (3 * f..3 * f + 3).any(|h| self.is_open(h));
-            open[pieces.find(f as u32) as usize] |= deep || edge;
+        let mut seen: Vec<bool> = inside.to_vec();
+        // A piece is given up at its first face that leads away; what is left of it is given up from there, too.
+        let mut away = vec![false; inside.len()];
+        for f in 0..inside.len() as u32 {
+            let at_border = !seen[f as usize] && self.beside(f).any(|g| inside[g as usize]);
+            if !at_border {
+                continue;
+            }
+            let (mut piece, mut next, mut lost) = (vec![f], 0, false);
+            seen[f as usize] = true;
+            while next < piece.len() && !lost {
+                let g = piece[next];
+                next += 1;
+                lost = away[g as usize] || self.leads_away(g, limit);
+                for n in self.beside(g) {
+                    lost |= away[n as usize];
+                    if !std::mem::replace(&mut seen[n as usize], true) {
+                        piece.push(n);
+                    }
+                }
+            }
+            for &g in &piece {
+                inside[g as usize] = !lost;
+                away[g as usize] = lost;
+            }
         }
-        for f in 0..inside.len() {
-            inside[f] = inside[f] || !open[pieces.find(f as u32) as usize];
-        }
+    }
+
+    /// Whether a piece of the rest that contains this face stays outside whatever surrounds it.
+    fn leads_away(&self, face: u32, limit: f64) -> bool {
+        let face = face as usize;
+        self.depth(face) > limit || (3 * face..3 * face + 3).any(|h| self.is_open(h))
     }
 
     /// Whether a half-edge lies on a loop of the whole mesh that is not a hole.
@@ -144,45 +157,49 @@ impl<'a> Growth<'a> {
 
     /// Takes out, at vertices where the region touches itself in a point, all fans but the largest; true when it took any.
     fn trim_bow_ties(&self, inside: &mut [bool]) -> bool {
-        let mut fans = Sets::new(3 * inside.len());
-        for (h, &t) in self
-            .topology
-            .twin
-            .iter()
-            .enumerate()
-            .filter(|&(_, &t)| t != NONE)
-        {
-            if inside[h / 3] && inside[t as usize / 3] {
-                fans.join(h as u32, next(t));
+        let across = |h: u32| match self.topology.twin[h as usize] {
+            t if t != NONE && inside[t as usize / 3] => t,
+            _ => NONE,
+        };
+        // Every open fan has one half-edge of the region's boundary that leaves its vertex.
+        let mut leaving = vec![0u8; self.mesh.positions.len()];
+        let mut ties = Vec::new();
+        for h in 0..3 * inside.len() as u32 {
+            if inside[h as usize / 3] && across(h) == NONE {
+                let v = self.topology.from(h);
+                let count = &mut leaving[v as usize];
+                *count = count.saturating_add(1);
+                if *count == 2 {
+                    ties.push(v);
+                }
             }
         }
-        let mut taken = Vec::new();
-        for v in 0..self.mesh.positions.len() as u32 {
-            let mut corners: Vec<(u32, u32)> = self
-                .topology
-                .leaving(v)
-                .iter()
-                .filter(|&&h| inside[h as usize / 3])
-                .map(|&h| (fans.find(h), h / 3))
-                .collect();
-            corners.sort_unstable();
-            let fan_count = corners.chunk_by(|a, b| a.0 == b.0).count();
-            if fan_count < 2 {
-                continue;
+        ties.sort_unstable();
+        let mut taken: Vec<u32> = Vec::new();
+        for v in ties {
+            let mut fans: Vec<Vec<u32>> = Vec::new();
+            for &h in self.topology.leaving(v) {
+                let starts = inside[h as usize / 3] && across(h) == NONE;
+                if starts {
+                    let round = |&e: &u32| Some(across(previous(e))).filter(|&t| t != NONE);
+                    let mut fan: Vec<u32> = std::iter::successors(Some(h), round)
+                        .map(|e| e / 3)
+                        .collect();
+                    fan.sort_unstable();
+                    fans.push(fan);
+                }
             }
-            let weight =
-                |fan: &[(u32, u32)]| (fan.iter().any(|c| self.touching[c.1 as usize]), fan.len());
-            let largest = corners.chunk_by(|a, b| a.0 == b.0).map(weight).max();
-            let mut kept = false;
-            for fan in corners.chunk_by(|a, b| a.0 == b.0) {
-                if !kept && Some(weight(fan)) == largest {
-                    kept = true;
-                } else {
-                    taken.extend(
-                        fan.iter()
-                            .map(|c| c.1)
-                            .filter(|&f| !self.touching[f as usize]),
-                    );
+            // By its smallest face, so that the choice among equals depends on the mesh alone.
+            fans.sort_unstable_by_key(|fan| fan.first().copied());
+            let weight = |fan: &Vec<u32>| {
+                let touching = fan.iter().any(|&f| self.touching[f as usize]);
+                (touching, fan.len())
+            };
+            let largest = fans.iter().map(weight).max();
+            let kept = fans.iter().position(|fan| Some(weight(fan)) == largest);
+            for (k, fan) in fans.iter().enumerate() {
+                if Some(k) != kept {
+                    taken.extend(fan.iter().filter(|&&f| !self.touching[f as usize]));
                 }
             }
         }
@@ -267,18 +284,5 @@ impl<'a> Growth<'a> {
             outer,
             reach,
         })
-    }
-}
-
-/// Which faces are meant.
-#[derive(Clone, Copy, PartialEq)]
-enum Side {
-    Inside,
-    Outside,
-}
-
-impl Side {
-    fn has(self, inside: bool) -> bool {
-        inside == (self == Side::Inside)
     }
 }

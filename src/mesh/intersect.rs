@@ -1,13 +1,9 @@
-//! Where a surface cuts through itself: an R-tree finds pairs of faces, exact predicates judge them.
+//! Where a surface cuts through itself: a tree of boxes finds pairs of faces, exact predicates judge them.
 
 use robust::{Coord, Coord3D, orient2d, orient3d};
-use rstar::primitives::{GeomWithData, Rectangle};
-use rstar::{AABB, Envelope, RTree, RTreeObject};
 
+use super::boxes::{Bounds, Tree};
 use super::{TriMesh, Vec3};
-
-/// The box of a face, and the face.
-type FaceBox = GeomWithData<Rectangle<[f64; 3]>, u32>;
 
 /// All pairs of faces `(f, g)`, `f < g`, that cut each other, ascending.
 ///
@@ -16,77 +12,74 @@ type FaceBox = GeomWithData<Rectangle<[f64; 3]>, u32>;
 /// must pass from one side of the other face's plane to the other: a corner that merely touches a face is no cut, two edges that cross in a
 /// point are. Faces with a position that is not finite are left out. O(n log n + pairs of overlapping boxes).
 pub fn self_intersections(mesh: &TriMesh) -> Vec<(u32, u32)> {
-    let boxes = (0..mesh.faces.len() as u32).filter_map(|f| face_box(mesh, f));
-    let tree = RTree::bulk_load(boxes.collect());
-    let mut pairs: Vec<(u32, u32)> = tree
-        .intersection_candidates_with_other_tree(&tree)
-        .map(|(f, g)| (f.data, g.data))
-        .filter(|&(f, g)| f < g && cut(mesh, f, g))
-        .collect();
-    pairs.sort_unstable();
-    pairs
+    let all: Vec<u32> = (0..mesh.faces.len() as u32).collect();
+    intersections_with(mesh, &all)
 }
 
 /// Those pairs of [`self_intersections`] with at least one side in `faces` (each below `mesh.faces.len()`, others are ignored).
 ///
 /// For a patch in a large scan: beyond the patch's bounding box it costs one comparison a face.
 pub fn intersections_with(mesh: &TriMesh, faces: &[u32]) -> Vec<(u32, u32)> {
+    let mut asked = vec![false; mesh.faces.len()];
     let known = faces.iter().filter(|&&f| (f as usize) < mesh.faces.len());
-    let asked: Vec<FaceBox> = known.filter_map(|&f| face_box(mesh, f)).collect();
-    let mut bounds = AABB::new_empty();
-    for boxed in &asked {
-        bounds.merge(&boxed.envelope());
-    }
-    let near = (0..mesh.faces.len() as u32).filter_map(|f| face_box(mesh, f));
-    let tree = RTree::bulk_load(near.filter(|b| b.envelope().intersects(&bounds)).collect());
+    known.for_each(|&f| asked[f as usize] = true);
+    let boxed = |f: u32| Some((Bounds::of(mesh, f)?, f));
+    let own = (0..mesh.faces.len() as u32).filter(|&f| asked[f as usize]);
+    let tree = Tree::new(own.filter_map(boxed).collect());
+    let Some(bounds) = tree.bounds() else {
+        return Vec::new();
+    };
     let mut pairs = Vec::new();
-    for boxed in &asked {
-        let f = boxed.data;
-        let near = tree.locate_in_envelope_intersecting(&boxed.envelope());
-        pairs.extend(
-            near.map(|g| (f.min(g.data), f.max(g.data)))
-                .filter(|&(f, g)| f != g),
-        );
+    for (near, g) in (0..mesh.faces.len() as u32).filter_map(boxed) {
+        if near.meets(bounds) {
+            tree.meeting(&near, |f| {
+                // Of two faces asked for, each finds the other; once is enough.
+                let once = f < g || (f > g && !asked[g as usize]);
+                if once && cut(mesh, f, g) {
+                    pairs.push((f.min(g), f.max(g)));
+                }
+            });
+        }
     }
     pairs.sort_unstable();
-    pairs.dedup();
-    pairs.retain(|&(f, g)| cut(mesh, f, g));
     pairs
-}
-
-fn face_box(mesh: &TriMesh, face: u32) -> Option<FaceBox> {
-    let corners = mesh.triangle(face as usize);
-    corners
-        .iter()
-        .all(|p| p.iter().all(|c| c.is_finite()))
-        .then(|| {
-            let bounds = AABB::from_points(&corners.map(<[f64; 3]>::from));
-            GeomWithData::new(Rectangle::from_aabb(bounds), face)
-        })
 }
 
 /// Whether two faces cut each other; see [`self_intersections`] for what counts.
 fn cut(mesh: &TriMesh, f: u32, g: u32) -> bool {
     let (mut a, mut b) = (mesh.triangle(f as usize), mesh.triangle(g as usize));
-    let shared: Vec<(usize, usize)> = (0..9)
+    let mut shared = (0..9)
         .map(|i| (i / 3, i % 3))
-        .filter(|&(i, j)| a[i] == b[j])
-        .collect();
-    match shared[..] {
-        [] => {}
-        [(i, j)] => {
-            a.rotate_left(i);
-            b.rotate_left(j);
-        }
-        _ => return false,
+        .filter(|&(i, j)| a[i] == b[j]);
+    let first = shared.next();
+    if shared.next().is_some() {
+        return false;
     }
-    let a_sides = a.map(|p| side(&b, p));
-    let b_sides = b.map(|p| side(&a, p));
+    if let Some((i, j)) = first {
+        a.rotate_left(i);
+        b.rotate_left(j);
+    }
+    // A shared corner comes first now, and lies in the other's plane.
+    let own = usize::from(first.is_some());
+    let beside = |sides: &[i8; 3]| {
+        sides[own..].iter().all(|&s| s > 0) || sides[own..].iter().all(|&s| s < 0)
+    };
+    let sides = |face: &[Vec3; 3], points: &[Vec3; 3]| {
+        [0, 1, 2].map(|k| if k < own { 0 } else { side(face, points[k]) })
+    };
+    let a_sides = sides(&b, &a);
+    if beside(&a_sides) {
+        return false;
+    }
+    let b_sides = sides(&a, &b);
+    if beside(&b_sides) {
+        return false;
+    }
     if a_sides == [0, 0, 0] || b_sides == [0, 0, 0] {
         return overlap_in_plane(&a, &b);
     }
-    // A shared corner comes first now; edges at it lie on one side of it or touch, only the one opposite can pass through.
-    let edges = if shared.is_empty() { 0..3 } else { 1..2 };
+    // Edges at a shared corner lie on one side of it or touch, only the one opposite can pass through.
+    let edges = if first.is_none() { 0..3 } else { 1..2 };
     edges.into_iter().any(|k| {
         let n = (k + 1) % 3;
         (a_sides[k] * a_sides[n] < 0 && line_meets(&b, a[k], a[n]))

@@ -2,7 +2,7 @@
 
 use super::collar::collar_turnings;
 use super::topology::{NONE, Topology, next};
-use super::{TriMesh, Vec3};
+use super::{TriMesh, Vec3, unit_for};
 
 /// What a boundary loop bounds, told by its total geodesic curvature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -84,9 +84,16 @@ fn describe(mesh: &TriMesh, topology: &Topology, half_edges: Vec<u32>) -> Bounda
     let origin = vertices
         .first()
         .map_or(Vec3::zeros(), |&v| mesh.positions[v as usize]);
+    let place = |v: u32| mesh.positions[v as usize] - origin;
+    let unit = unit_for(
+        vertices
+            .iter()
+            .map(|&v| place(v).amax())
+            .fold(0.0, f64::max),
+    );
     for &h in &half_edges {
-        let a = mesh.positions[topology.from(h) as usize] - origin;
-        let b = mesh.positions[topology.to(h) as usize] - origin;
+        let a = place(topology.from(h)) / unit;
+        let b = place(topology.to(h)) / unit;
         let edge = (b - a).norm();
         length += edge;
         moment += (a + b) * (0.5 * edge);
@@ -94,13 +101,13 @@ fn describe(mesh: &TriMesh, topology: &Topology, half_edges: Vec<u32>) -> Bounda
     }
     BoundaryLoop {
         id: 0,
-        length,
+        length: (length * unit).min(f64::MAX),
         centroid: if length > 0.0 {
-            origin + moment / length
+            origin + moment / length * unit
         } else {
             origin
         },
-        area: area.norm(),
+        area: (area.norm() * unit * unit).min(f64::MAX),
         turning: 0.0,
         kind: kind(0.0),
         component: half_edges
@@ -307,6 +314,25 @@ mod tests {
         assert!((loops[1].length - 1.8).abs() < 1e-12);
         assert!((loops[1].area - 0.2).abs() < 1e-12);
         assert!((loops[1].centroid - Vec3::new(0.4, 2.0, 0.55)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn the_size_of_a_sheet_does_not_change_what_its_loops_are() {
+        for size in [1e-200, 1e-30, 1e30, 1e200, 1e300] {
+            let keep = |u: f64, v: f64| (u - 0.5).hypot(v - 0.5) > 0.2;
+            let soup = sheet(16, keep, |u, v| {
+                Vec3::new(u, v, 0.1 * (9.0 * u).sin()) * size
+            });
+            let (_, _, loops) = loops_of(&soup);
+            let found: Vec<_> = loops.iter().map(|l| l.kind).collect();
+            assert_eq!(found, [LoopKind::Outer, LoopKind::Hole], "{size}");
+            assert!(
+                loops
+                    .iter()
+                    .all(|l| l.length.is_finite() && l.area.is_finite())
+            );
+            assert!((loops[1].centroid / size - Vec3::new(0.5, 0.5, -0.1)).norm() < 0.1);
+        }
     }
 
     #[test]

@@ -2,6 +2,7 @@
 //! Small free functions on `TriMesh`, one idea a file; everything is in scene units and f64.
 //! No glTF, no charts, no grids, no files: those rooms stand on this one.
 
+mod boxes;
 mod collar;
 pub mod curvature;
 pub mod geodesic;
@@ -46,6 +47,17 @@ impl TriMesh {
             p[(corner + 1) % 3] - p[corner],
             p[(corner + 2) % 3] - p[corner],
         );
+        let unit = unit_for(a.amax().max(b.amax()));
+        let (a, b) = (a / unit, b / unit);
         a.cross(&b).norm().atan2(a.dot(&b))
+    }
+}
+
+/// What to divide lengths of this size by so that their products neither overflow nor vanish: 1 for any size met outside attacks.
+fn unit_for(size: f64) -> f64 {
+    if size == 0.0 || (1e-100..1e100).contains(&size) {
+        1.0
+    } else {
+        size
     }
 }

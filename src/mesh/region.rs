@@ -8,7 +8,7 @@ use super::topology::Topology;
 /// A piece of the mesh around one hole, as a mesh of its own.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Region {
-    /// The piece; every boundary vertex lies on exactly one of its loops.
+    /// The piece as scanned; every boundary vertex lies on exactly one of its loops.
     pub mesh: TriMesh,
     /// Local vertex -> vertex of the whole mesh. A vertex where the piece touches itself only in a point appears twice.
     pub vertices: Vec<u32>,
@@ -35,6 +35,18 @@ pub enum RegionError {
         /// How many loops there are.
         loops: usize,
     },
+    /// Products of coordinates this large overflow.
+    #[error(
+        "a coordinate of the cloth round loop {rim} is {coordinate:e}; at most {limit:e} can be measured"
+    )]
+    TooLarge {
+        /// Id of the rim.
+        rim: u32,
+        /// The largest coordinate.
+        coordinate: f64,
+        /// The largest allowed.
+        limit: f64,
+    },
     /// Even three edges wide the cloth round the rim is no disk.
     #[error(
         "the cloth within {reach:.4} of loop {rim} has {handles} handle(s) and {outer} outer loop(s); \
@@ -54,6 +66,9 @@ pub enum RegionError {
 
 /// What the reach is multiplied by when the piece is no disk.
 const SHRINK: f64 = 0.8;
+/// Largest coordinate that a region may have: its cube is a number still.
+const LARGEST: f64 = 1e100;
+
 /// The cloth within geodesic distance `reach` (scene units; infinite for all there is) of loop `rim`, made a disk.
 ///
 /// Pieces that the region encloses are filled back in when they are shallow, islands are dropped. When what is left is
@@ -61,7 +76,7 @@ const SHRINK: f64 = 0.8;
 /// three edges, which is also the least it starts from. Other hole loops wholly inside become `holes`; those the border cuts become part of `outer`.
 ///
 /// # Errors
-/// When the rim does not exist, or no reach gives a disk.
+/// When the rim does not exist, its coordinates are beyond measure, or no reach gives a disk.
 pub fn grow(
     mesh: &TriMesh,
     topology: &Topology,
@@ -75,6 +90,7 @@ pub fn grow(
             loops: loops.len(),
         });
     };
+    small_enough(mesh, asked, &asked.vertices)?;
     let growth = Growth::new(mesh, topology, loops, asked, reach);
     let narrowest = growth.narrowest;
     let farthest = growth
@@ -87,7 +103,10 @@ pub fn grow(
     loop {
         reach = reach.max(narrowest);
         let (handles, outer) = match growth.cut(reach) {
-            Ok(region) => return Ok(region),
+            Ok(region) => {
+                small_enough(mesh, asked, &region.vertices)?;
+                return Ok(region);
+            }
             Err(shape) => shape,
         };
         if reach <= narrowest {
@@ -100,6 +119,19 @@ pub fn grow(
         }
         reach *= SHRINK;
     }
+}
+
+fn small_enough(mesh: &TriMesh, rim: &BoundaryLoop, vertices: &[u32]) -> Result<(), RegionError> {
+    let sizes = vertices.iter().map(|&v| mesh.positions[v as usize].amax());
+    let coordinate = sizes.fold(0.0, f64::max);
+    if coordinate <= LARGEST {
+        return Ok(());
+    }
+    Err(RegionError::TooLarge {
+        rim: rim.id,
+        coordinate,
+        limit: LARGEST,
+    })
 }
 
 #[cfg(test)]
@@ -195,6 +227,8 @@ mod tests {
             };
             let bumps = |u: f64, v: f64| Vec3::new(u, v, 0.15 * (9.0 * u).sin() * (7.0 * v).cos());
             let whole = Whole::new(&shaken(&sheet(n, keep, bumps), noise / n as f64, seed));
+            // Moths may eat their way from the hole to the border.
+            prop_assume!(whole.loops.iter().any(|l| l.kind == LoopKind::Hole));
             let rough = whole.grow(reach);
             prop_assert!(rough.is_ok(), "{:?}", rough.map(|_| ()));
             check(&whole, &rough.expect("a region"))?;
@@ -267,6 +301,17 @@ mod tests {
                     ..
                 })
             ),
+            "{refused:?}"
+        );
+    }
+
+    #[test]
+    fn coordinates_beyond_measure_are_refused_with_numbers() {
+        let mut huge = holed_sheet(12, 0.2);
+        huge.positions.iter_mut().for_each(|p| *p *= 1e200);
+        let refused = Whole::new(&huge).grow(1e199);
+        assert!(
+            matches!(refused, Err(RegionError::TooLarge { coordinate, .. }) if coordinate > 1e199),
             "{refused:?}"
         );
     }

@@ -2,7 +2,7 @@
 //!
 //! Half-edge `3 * face + corner` runs from that corner's vertex to the next corner's. A face is on the left of its own half-edges.
 
-use super::{TriMesh, Vec3};
+use super::TriMesh;
 
 /// "No such half-edge": the twin of a half-edge on the boundary.
 pub const NONE: u32 = u32::MAX;
@@ -53,6 +53,11 @@ impl Topology {
     /// When a face names a vertex that does not exist.
     pub fn new(mesh: &TriMesh) -> Self {
         let (twin, non_manifold) = pair_half_edges(&mesh.faces, &places(mesh));
+        Self::with_twins(mesh, twin, non_manifold)
+    }
+
+    /// The topology of faces whose half-edges are paired already.
+    pub(super) fn with_twins(mesh: &TriMesh, twin: Vec<u32>, non_manifold: Vec<u32>) -> Self {
         let origins = mesh.faces.as_flattened().to_vec();
         let (component, components) = face_components(&twin);
         let (around_start, around) = corners_by_vertex(&origins, mesh.positions.len());
@@ -83,6 +88,11 @@ impl Topology {
         &self.around[self.around_start[v] as usize..self.around_start[v + 1] as usize]
     }
 
+    /// How many vertices the mesh has.
+    pub fn vertices(&self) -> usize {
+        self.around_start.len() - 1
+    }
+
     /// The faces at `vertex`, ascending.
     pub fn faces_at(&self, vertex: u32) -> impl Iterator<Item = u32> + '_ {
         self.leaving(vertex).iter().map(|h| h / 3)
@@ -102,8 +112,7 @@ impl Topology {
 
     /// Per vertex whether it lies on a boundary (or on no face at all).
     pub fn boundary_vertices(&self) -> Vec<bool> {
-        let vertices = self.around_start.len() - 1;
-        let mut boundary: Vec<bool> = (0..vertices)
+        let mut boundary: Vec<bool> = (0..self.vertices())
             .map(|v| self.around_start[v] == self.around_start[v + 1])
             .collect();
         for h in (0..self.twin.len() as u32).filter(|&h| self.twin[h as usize] == NONE) {
@@ -142,15 +151,22 @@ pub(super) fn pair_half_edges(faces: &[[u32; 3]], place: &[u32]) -> (Vec<u32>, V
         .map(|s| &edges[s[0] as usize..s[1] as usize])
     {
         for group in bucket.chunk_by(|x, y| x.0 == y.0).filter(|g| g.len() > 1) {
+            if let [(_, g), (_, h)] = *group {
+                if ends(g) == ends(h) {
+                    join(&[g, h]);
+                }
+                // A lone pair that runs against each other is a seam, or the two banks of a cut.
+                if at(g) == at(h) {
+                    unpaired.extend([g, h]);
+                }
+                continue;
+            }
             let mut group: Vec<u32> = group.iter().map(|e| e.1).collect();
             group.sort_unstable_by_key(|&h| (ends(h), h));
             group
                 .chunk_by(|&g, &h| ends(g) == ends(h))
                 .for_each(&mut join);
-            // A lone pair that runs against each other is a seam, or the two banks of a cut.
-            if group.len() > 2 || at(group[0]) == at(group[1]) {
-                unpaired.extend(group);
-            }
+            unpaired.extend(group);
         }
     }
     unpaired.retain(|&h| twin[h as usize] == NONE);
@@ -183,7 +199,7 @@ fn edges_by_place(origins: &[u32], place: &[u32]) -> (Vec<u32>, Vec<(u32, u32)>)
 }
 
 /// Where each of `count` buckets starts when `keys` are sorted into them, and where the last ends.
-fn bucket_starts(keys: impl Iterator<Item = u32>, count: usize) -> Vec<u32> {
+pub(super) fn bucket_starts(keys: impl Iterator<Item = u32>, count: usize) -> Vec<u32> {
     let mut starts = vec![0; count + 1];
     for key in keys {
         starts[key as usize + 1] += 1;
@@ -194,44 +210,108 @@ fn bucket_starts(keys: impl Iterator<Item = u32>, count: usize) -> Vec<u32> {
     starts
 }
 
-/// Per vertex the first vertex at exactly the same position.
+/// Per vertex the first vertex at exactly the same position. Near linear; n log n where an input was made to collide.
 pub(super) fn places(mesh: &TriMesh) -> Vec<u32> {
     // Adding +0 turns −0 into 0 and leaves every other number's bits alone.
-    let bits = |p: &Vec3| [p.x, p.y, p.z].map(|c| (c + 0.0).to_bits());
-    // Sorted rather than hashed: no input makes it slow.
-    let mut keys: Vec<([u64; 3], u32)> = mesh
-        .positions
-        .iter()
-        .enumerate()
-        .map(|(v, p)| (bits(p), v as u32))
+    let bits = |v: u32| {
+        let p = &mesh.positions[v as usize];
+        [p.x, p.y, p.z].map(|c| (c + 0.0).to_bits())
+    };
+    let count = mesh.positions.len().next_power_of_two().max(2);
+    let buckets: Vec<u32> = (0..mesh.positions.len() as u32)
+        .map(|v| (mixed(bits(v)) >> (64 - count.trailing_zeros())) as u32)
         .collect();
-    keys.sort_unstable();
-    let mut place = vec![0; keys.len()];
-    for group in keys.chunk_by(|a, b| a.0 == b.0) {
-        for (_, v) in group {
-            place[*v as usize] = group[0].1;
+    let starts = bucket_starts(buckets.iter().copied(), count);
+    let mut fill = starts.clone();
+    let mut sorted = vec![0; buckets.len()];
+    for (v, &bucket) in (0..).zip(&buckets) {
+        sorted[fill[bucket as usize] as usize] = v;
+        fill[bucket as usize] += 1;
+    }
+    let mut place: Vec<u32> = (0..buckets.len() as u32).collect();
+    for s in starts.windows(2).filter(|s| s[1] - s[0] > 1) {
+        // Sorted rather than compared pair by pair: no input makes it slow.
+        let bucket = &mut sorted[s[0] as usize..s[1] as usize];
+        bucket.sort_unstable_by_key(|&v| (bits(v), v));
+        for group in bucket.chunk_by(|&a, &b| bits(a) == bits(b)) {
+            for &v in group {
+                place[v as usize] = group[0];
+            }
         }
     }
     place
 }
 
+/// Mixes the bits of a position so that the high ones spread evenly over buckets (Fibonacci hashing; the factors are odd and irrational-like).
+fn mixed(bits: [u64; 3]) -> u64 {
+    let factors = [
+        0x9e37_79b9_7f4a_7c15_u64,
+        0xc2b2_ae3d_27d4_eb4f,
+        0x1656_67b1_9e37_79f9,
+    ];
+    let sum = (bits.iter().zip(factors)).fold(0u64, |sum, (b, f)| {
+        sum.rotate_left(23)
+            .wrapping_add((b ^ (b >> 29)).wrapping_mul(f))
+    });
+    (sum ^ (sum >> 32)).wrapping_mul(factors[0])
+}
+
 /// Groups corners into fans: corners at one vertex whose faces are joined by twins. Returns the fan of every corner,
 /// numbered by first corner, and how many there are.
 pub(super) fn corner_fans(twin: &[u32]) -> (Vec<u32>, usize) {
-    let mut sets = Sets::new(twin.len());
-    for (h, &t) in twin.iter().enumerate().filter(|&(_, &t)| t != NONE) {
-        // h runs from its corner to the next; t the other way: h's corner is the one after t's.
-        sets.join(h as u32, next(t));
+    let mut fan = vec![NONE; twin.len()];
+    let mut count = 0;
+    for first in 0..twin.len() as u32 {
+        if fan[first as usize] != NONE {
+            continue;
+        }
+        // h runs from its corner to the next; its twin t the other way: the corner of the face beyond is the one after t's.
+        let mut h = first;
+        while h != NONE && fan[h as usize] == NONE {
+            fan[h as usize] = count;
+            h = across(twin[h as usize], next);
+        }
+        // An open fan goes on round the other way.
+        let mut h = twin[previous(first) as usize];
+        while h != NONE && fan[h as usize] == NONE {
+            fan[h as usize] = count;
+            h = twin[previous(h) as usize];
+        }
+        count += 1;
     }
-    sets.numbered()
+    (fan, count as usize)
+}
+
+/// What `step` makes of a half-edge, if there is one.
+fn across(half_edge: u32, step: impl Fn(u32) -> u32) -> u32 {
+    if half_edge == NONE {
+        NONE
+    } else {
+        step(half_edge)
+    }
 }
 
 fn face_components(twin: &[u32]) -> (Vec<u32>, usize) {
-    let mut sets = Sets::new(twin.len() / 3);
-    for (h, &t) in twin.iter().enumerate().filter(|&(_, &t)| t != NONE) {
-        sets.join(h as u32 / 3, t / 3);
+    let mut component = vec![NONE; twin.len() / 3];
+    let (mut count, mut open) = (0, Vec::new());
+    for first in 0..component.len() {
+        if component[first] != NONE {
+            continue;
+        }
+        component[first] = count;
+        open.push(first);
+        while let Some(f) = open.pop() {
+            for &t in twin[3 * f..3 * f + 3].iter().filter(|&&t| t != NONE) {
+                let g = t as usize / 3;
+                if component[g] == NONE {
+                    component[g] = count;
+                    open.push(g);
+                }
+            }
+        }
+        count += 1;
     }
-    sets.numbered()
+    (component, count as usize)
 }
 
 fn corners_by_vertex(origins: &[u32], vertices: usize) -> (Vec<u32>, Vec<u32>) {
@@ -243,50 +323,4 @@ fn corners_by_vertex(origins: &[u32], vertices: usize) -> (Vec<u32>, Vec<u32>) {
         fill[v as usize] += 1;
     }
     (starts, around)
-}
-
-/// Disjoint sets of numbers; the smallest member stands for its set, so nothing depends on the order of joining.
-pub(super) struct Sets {
-    parent: Vec<u32>,
-}
-
-impl Sets {
-    /// `count` sets of one.
-    pub(super) fn new(count: usize) -> Self {
-        Self {
-            parent: (0..count as u32).collect(),
-        }
-    }
-
-    /// The smallest member of the set of `x`.
-    pub(super) fn find(&mut self, mut x: u32) -> u32 {
-        while self.parent[x as usize] != x {
-            let above = self.parent[self.parent[x as usize] as usize];
-            self.parent[x as usize] = above;
-            x = above;
-        }
-        x
-    }
-
-    /// Makes one set of the sets of `x` and `y`.
-    pub(super) fn join(&mut self, x: u32, y: u32) {
-        let (a, b) = (self.find(x), self.find(y));
-        self.parent[a.max(b) as usize] = a.min(b);
-    }
-
-    /// Per member the number of its set, counted by smallest member, and how many sets there are.
-    pub(super) fn numbered(mut self) -> (Vec<u32>, usize) {
-        let mut count = 0;
-        let mut number = vec![0; self.parent.len()];
-        for x in 0..self.parent.len() as u32 {
-            let root = self.find(x);
-            if root == x {
-                number[x as usize] = count;
-                count += 1;
-            } else {
-                number[x as usize] = number[root as usize];
-            }
-        }
-        (number, count as usize)
-    }
 }

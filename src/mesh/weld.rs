@@ -1,7 +1,7 @@
 //! Welding: one vertex per exact position, then one vertex per sheet where sheets touch only in a point or an edge.
 
 use super::TriMesh;
-use super::topology::{corner_fans, pair_half_edges, places};
+use super::topology::{Topology, bucket_starts, corner_fans, pair_half_edges, places};
 
 /// A soup made into surfaces, and the way back.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -13,6 +13,18 @@ pub struct Welded {
     /// Faces of the soup left out: two corners in one place, the same three places as an earlier face (whichever side it
     /// shows), or an index out of range.
     pub dropped: usize,
+    /// The twins of the welded mesh's half-edges, when no two sheets of the soup share an edge: else splitting them pairs more.
+    twin: Option<Vec<u32>>,
+}
+
+impl Welded {
+    /// [`Topology::new`] of the welded mesh, without pairing its half-edges again.
+    pub fn topology(&self) -> Topology {
+        match &self.twin {
+            Some(twin) => Topology::with_twins(&self.mesh, twin.clone(), Vec::new()),
+            None => Topology::new(&self.mesh),
+        }
+    }
 }
 
 /// Welds `soup` by exact position (−0 equals 0) and splits bow-ties.
@@ -22,27 +34,12 @@ pub struct Welded {
 /// run the same way (a sheet crossed by such an edge up to its border is slit there). The result depends on the order of faces only, not on how the soup numbered its vertices. Near linear.
 pub fn weld(soup: &TriMesh) -> Welded {
     let place = places(soup);
-    let mut found = Vec::with_capacity(soup.faces.len());
-    for (f, face) in soup.faces.iter().enumerate() {
-        if let [Some(&a), Some(&b), Some(&c)] = face.map(|v| place.get(v as usize))
-            && a != b
-            && b != c
-            && c != a
-        {
-            let mut key = [a, b, c];
-            key.sort_unstable();
-            found.push((key, f as u32));
-        }
-    }
-    found.sort_unstable();
-    found.dedup_by_key(|face| face.0);
-    let mut face_of: Vec<u32> = found.into_iter().map(|face| face.1).collect();
-    face_of.sort_unstable();
+    let face_of = distinct_faces(&soup.faces, &place);
     let faces: Vec<[u32; 3]> = face_of
         .iter()
         .map(|&f| soup.faces[f as usize].map(|v| place[v as usize]))
         .collect();
-    let (twin, _) = pair_half_edges(&faces, &place);
+    let (twin, unpaired) = pair_half_edges(&faces, &place);
     let (fan, fans) = corner_fans(&twin);
     let mut positions = Vec::with_capacity(fans);
     for (corner, &old) in faces.as_flattened().iter().enumerate() {
@@ -59,7 +56,44 @@ pub fn weld(soup: &TriMesh) -> Welded {
         },
         face_of,
         dropped,
+        twin: unpaired.is_empty().then_some(twin),
     }
+}
+
+/// The faces with three different places that no earlier face has, ascending.
+fn distinct_faces(faces: &[[u32; 3]], place: &[u32]) -> Vec<u32> {
+    let places = |face: &[u32; 3]| match face.map(|v| place.get(v as usize)) {
+        [Some(&a), Some(&b), Some(&c)] if a != b && b != c && c != a => {
+            let mut key = [a, b, c];
+            key.sort_unstable();
+            Some(key)
+        }
+        _ => None,
+    };
+    // In buckets by lowest place, each sorted: near linear, and no input makes it slow.
+    let sound = || {
+        (0u32..)
+            .zip(faces)
+            .filter_map(|(f, face)| Some((places(face)?, f)))
+    };
+    let starts = bucket_starts(sound().map(|(key, _)| key[0]), place.len());
+    let mut fill = starts.clone();
+    let mut sorted = vec![(0, 0, 0); starts.last().map_or(0, |&end| end as usize)];
+    for ([low, middle, high], f) in sound() {
+        sorted[fill[low as usize] as usize] = (middle, high, f);
+        fill[low as usize] += 1;
+    }
+    let mut first = vec![false; faces.len()];
+    for s in starts.windows(2) {
+        let bucket = &mut sorted[s[0] as usize..s[1] as usize];
+        bucket.sort_unstable();
+        for group in bucket.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
+            first[group[0].2 as usize] = true;
+        }
+    }
+    (0..faces.len() as u32)
+        .filter(|&f| first[f as usize])
+        .collect()
 }
 
 #[cfg(test)]
@@ -103,6 +137,15 @@ mod tests {
             let welded = weld(&soup);
             prop_assert_eq!(&weld(&shuffled(&soup, seed)), &welded);
             prop_assert_eq!(&weld(&exploded(&soup)), &welded);
+        }
+
+        #[test]
+        fn the_topology_is_that_of_the_mesh(soup in moth_eaten(), seed: u64) {
+            let both = together(&soup, &shuffled(&soup, seed));
+            for soup in [&soup, &exploded(&soup), &both] {
+                let welded = weld(soup);
+                prop_assert_eq!(welded.topology(), Topology::new(&welded.mesh));
+            }
         }
 
         #[test]
