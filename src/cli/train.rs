@@ -50,6 +50,9 @@ pub struct Args {
     /// Go on from the checkpoint in the output folder
     #[arg(long)]
     resume: bool,
+    /// Start from the weights in this file instead of random ones
+    #[arg(long, conflicts_with = "resume")]
+    from: Option<PathBuf>,
 }
 
 pub fn run(args: &Args) -> Result<(), Failure> {
@@ -80,6 +83,7 @@ impl Args {
             } else {
                 Start::Fresh
             },
+            from: self.from.clone(),
             network: UnetConfig {
                 width: self.width,
                 ..UnetConfig::default()

@@ -1,6 +1,6 @@
 //! Holes on the 64×64 grid: circle, ring and percolation as in the paper, and the tears and ragged blobs that worn cloth has.
 //!
-//! A hole takes about 0.3 to 0.65 of the grid's side, as in the regions that `flatten` cuts out, and stays clear of the grid's border.
+//! A hole takes about 0.3 to 0.65 of the grid's side, as in the regions that `flatten` cuts out, sometimes up to 0.88, and stays clear of the grid's border.
 //! A mask is `CELLS` flags, true in the hole, in the grid's order.
 
 use crate::grid::{CELLS, SIDE};
@@ -12,7 +12,9 @@ use std::f32::consts::{PI, TAU};
 /// Cells between a hole and the grid's border, at least.
 pub const MARGIN: usize = 3;
 /// Least and greatest share of the grid's cells that all holes of a mask take.
-pub const SHARE: (f32, f32) = (0.04, 0.30);
+pub const SHARE: (f32, f32) = (0.04, 0.5);
+/// Share of holes so large that little cloth is left around them, as where a region cannot grow further.
+const LARGE: f64 = 0.15;
 
 /// The kinds of holes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -63,7 +65,12 @@ pub fn draw(rng: &mut impl Rng) -> Vec<bool> {
 /// Draws a mask of one hole of the given shape, somewhere near the middle.
 pub fn draw_shape(shape: Shape, rng: &mut impl Rng) -> Vec<bool> {
     loop {
-        let extent = SIDE as f32 * rng.random_range(0.30..0.65);
+        let extent = SIDE as f32
+            * if rng.random_bool(LARGE) {
+                rng.random_range(0.65..0.88)
+            } else {
+                rng.random_range(0.30..0.65)
+            };
         let middle = [place(rng), place(rng)];
         let mask = match shape {
             Shape::Circle => disk(middle, 0.0, 0.5 * extent),

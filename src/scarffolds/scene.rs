@@ -21,6 +21,8 @@ pub enum Kind {
     TwoCorners,
     /// One edge held at several points drawn together: a curtain.
     Curtain,
+    /// Two opposite edges held at their ends and middles, one turned against the other about the line between them.
+    Twisted,
     /// One to three vertices anywhere carried.
     Points,
     /// Fallen on a sphere, a bar, a block or the floor.
@@ -62,16 +64,17 @@ impl Scene {
     pub fn draw(rng: &mut ChaCha8Rng) -> Self {
         let kind = match rng.random_range(0..100) {
             0..54 => Kind::FourCorners,
-            54..66 => Kind::ThreeCorners,
-            66..76 => Kind::TwoCorners,
-            76..83 => Kind::Curtain,
-            83..88 => Kind::Points,
+            54..64 => Kind::ThreeCorners,
+            64..72 => Kind::TwoCorners,
+            72..79 => Kind::Curtain,
+            79..85 => Kind::Twisted,
+            85..89 => Kind::Points,
             _ => Kind::Draped,
         };
-        let fold = log_uniform(rng, 0.0075, 0.036);
+        let fold = log_uniform(rng, 0.003, 0.028);
         let fabric = Fabric {
             bend: GRAVITY * fold * fold * fold,
-            shear: log_uniform(rng, 2.0e4, 3.0e5),
+            shear: log_uniform(rng, 1.0e3, 2.0e5),
             thickness: SPACING * rng.random_range(0.74..0.9),
             friction: rng.random_range(0.05..0.5),
             air: rng.random_range(0.3..2.0),
@@ -79,6 +82,7 @@ impl Scene {
         let pins = draw_pins(kind, rng);
         let targets = match kind {
             Kind::Curtain => gathered(&pins, rng),
+            Kind::Twisted => twisted(&pins, rng),
             _ => scattered(&pins, rng),
         };
         let gust = rng.random_range(0.0f32..1.0).powi(2) * 3.0;
@@ -224,6 +228,10 @@ fn draw_pins(kind: Kind, rng: &mut ChaCha8Rng) -> Vec<usize> {
                 .map(|n| (n * (SIDE - 1) + (hooks - 1) / 2) / (hooks - 1))
                 .collect()
         }
+        Kind::Twisted => (0..3)
+            .map(|n| n * (SIDE - 1) / 2)
+            .flat_map(|i| [i, VERTICES - SIDE + i])
+            .collect(),
         Kind::Points => {
             let mut pins: Vec<usize> = (0..rng.random_range(1..4))
                 .map(|_| rng.random_range(0..VERTICES))
@@ -239,8 +247,8 @@ fn draw_pins(kind: Kind, rng: &mut ChaCha8Rng) -> Vec<usize> {
 
 /// Targets drawn around the shrunken, turned flat places of the pins, no two further apart than the cloth allows.
 fn scattered(pins: &[usize], rng: &mut ChaCha8Rng) -> Vec<Point> {
-    let shrink = rng.random_range(0.2..0.95);
-    let mut spread = rng.random_range(0.08..0.6);
+    let shrink = rng.random_range(0.0..0.9);
+    let mut spread = rng.random_range(0.1..0.75);
     let tilt = rng.random_range(0.0..std::f32::consts::FRAC_PI_2);
     let turn = rng.random_range(0.0..std::f32::consts::TAU);
     let axis = Unit::new_normalize(Point::new(turn.cos(), turn.sin(), 0.0));
@@ -253,12 +261,7 @@ fn scattered(pins: &[usize], rng: &mut ChaCha8Rng) -> Vec<Point> {
                     + Point::from_fn(|_, _| rng.random_range(-spread..spread))
             })
             .collect();
-        let allowed = (0..pins.len()).all(|a| {
-            (0..a).all(|b| {
-                (targets[a] - targets[b]).norm() <= 0.97 * (flat(pins[a]) - flat(pins[b])).norm()
-            })
-        });
-        if allowed {
+        if allowed(pins, &targets) {
             return targets;
         }
         spread *= 0.98;
@@ -281,6 +284,41 @@ fn gathered(pins: &[usize], rng: &mut ChaCha8Rng) -> Vec<Point> {
             )
         })
         .collect()
+}
+
+/// Two edges brought nearer to each other, gathered, and turned against each other about the line between them.
+fn twisted(pins: &[usize], rng: &mut ChaCha8Rng) -> Vec<Point> {
+    let angle = rng.random_range(0.3..1.6f32);
+    let mut near = rng.random_range(0.4..0.9f32);
+    let gather = rng.random_range(0.3..0.9f32);
+    let lean = Rotation3::from_axis_angle(
+        &Unit::new_normalize(Point::new(1.0, 0.3, 0.0)),
+        rng.random_range(0.0..std::f32::consts::FRAC_PI_2),
+    );
+    loop {
+        let targets: Vec<Point> = pins
+            .iter()
+            .map(|&k| {
+                let p = flat(k);
+                let turn = Rotation3::from_axis_angle(&Point::y_axis(), angle * p.y.signum());
+                lean * (turn * Point::new(gather * p.x, 0.0, 0.0)
+                    + Point::new(0.0, near * p.y, 0.0))
+            })
+            .collect();
+        if allowed(pins, &targets) {
+            return targets;
+        }
+        near *= 0.95;
+    }
+}
+
+/// Whether no two targets are further apart than the flat sheet allows.
+fn allowed(pins: &[usize], targets: &[Point]) -> bool {
+    (0..pins.len()).all(|a| {
+        (0..a).all(|b| {
+            (targets[a] - targets[b]).norm() <= 0.97 * (flat(pins[a]) - flat(pins[b])).norm()
+        })
+    })
 }
 
 fn draw_obstacles(rng: &mut ChaCha8Rng) -> Vec<Collider> {

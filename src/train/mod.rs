@@ -69,6 +69,9 @@ pub struct TrainOptions {
     pub out: PathBuf,
     /// Continue from the checkpoint in `out`.
     pub resume: Start,
+    /// A fresh run starts from these weights instead of random ones.
+    #[serde(default)]
+    pub from: Option<PathBuf>,
     /// The network.
     pub network: UnetConfig,
     /// Weights of the loss's terms.
@@ -104,6 +107,7 @@ impl Default for TrainOptions {
             held_out: "sheets/held".into(),
             out: "train".into(),
             resume: Start::Fresh,
+            from: None,
             network: UnetConfig::default(),
             loss: LossWeights::default(),
             batch: 16,

@@ -86,7 +86,7 @@ where
         source,
     })?;
     let mut state: State<B> = match options.resume {
-        Start::Fresh => fresh(options, &device),
+        Start::Fresh => fresh(options, &device)?,
         Start::Resume => checkpoint::load(options, &options.out, &device)?,
     };
     let held_out: Vec<Prepared> = sources
@@ -167,19 +167,35 @@ fn check(options: &TrainOptions) -> Result<(), TrainError> {
     Ok(())
 }
 
-fn fresh<B>(options: &TrainOptions, device: &B::Device) -> State<B>
+fn fresh<B>(options: &TrainOptions, device: &B::Device) -> Result<State<B>, TrainError>
 where
     B: AutodiffBackend<InnerBackend: Convolve> + Convolve,
 {
     B::seed(device, options.seed);
-    let network = options.network.init::<B>(device);
+    let network = match &options.from {
+        None => options.network.init::<B>(device),
+        Some(path) => {
+            let bytes = std::fs::read(path).map_err(|source| TrainError::File {
+                path: path.clone(),
+                source,
+            })?;
+            let (network, card) = weights::load::<B>(&bytes, device)?;
+            if card.architecture != options.network {
+                return Err(TrainError::Options(format!(
+                    "{} holds another architecture than the one to train",
+                    path.display()
+                )));
+            }
+            network
+        }
+    };
     let averaged = network.valid();
-    State {
+    Ok(State {
         network,
         averaged,
         optimiser: AdamW::default(),
         seconds: 0.0,
-    }
+    })
 }
 
 /// Learning rate at a share of the budget: a linear rise over the first steps, then half a cosine.
