@@ -31,6 +31,15 @@ pub trait Convolve: Backend {
         Self::conv2d(x, kernel, None, options())
     }
 
+    /// Gradient with respect to `x` alone, from the one with respect to the result.
+    fn convolve_backward_x(
+        x: FloatTensor<Self>,
+        kernel: FloatTensor<Self>,
+        gradient: FloatTensor<Self>,
+    ) -> FloatTensor<Self> {
+        Self::conv2d_x_backward(x, kernel, gradient, options())
+    }
+
     /// Gradients with respect to `x` and `kernel`, from the one with respect to the result.
     fn convolve_backward(
         x: FloatTensor<Self>,
@@ -62,6 +71,12 @@ impl Convolve for Flex {
         images.map_groups(to, |columns| Flex::float_matmul(matrix.clone(), columns))
     }
 
+    fn convolve_backward_x(_: FlexTensor, kernel: FlexTensor, gradient: FlexTensor) -> FlexTensor {
+        let from = kernel.shape().dims::<4>()[1];
+        let turned = turned(&kernel.to_contiguous());
+        Images::of(gradient).map_groups(from, |columns| Flex::float_matmul(turned.clone(), columns))
+    }
+
     fn convolve_backward(
         x: FlexTensor,
         kernel: FlexTensor,
@@ -71,12 +86,7 @@ impl Convolve for Flex {
         let [to, from, ..] = kernel.shape().dims::<4>();
         let kernel = kernel.to_contiguous();
         let weights: &[f32] = kernel.storage();
-        // The gradient of x is the convolution of the gradient with the kernel turned by half a turn, its channels swapped.
-        let mut turned = vec![0.0; weights.len()];
-        each_tap(to, from, |straight, swapped| {
-            turned[swapped] = weights[straight]
-        });
-        let turned = flex(turned, [from, to * TAPS]);
+        let turned = turned(&kernel);
         let groups: Vec<(FlexTensor, FlexTensor)> = gradients
             .groups()
             .into_par_iter()
@@ -103,6 +113,18 @@ impl Convolve for Flex {
             flex(sums, [to, from, height, width]),
         ]
     }
+}
+
+/// A contiguous kernel turned by half a turn, its channels swapped: `[to, from, 3, 3] -> [from, to · 9]`. The gradient of a convolution's
+/// input is the convolution of the result's gradient with it.
+fn turned(kernel: &FlexTensor) -> FlexTensor {
+    let [to, from, ..] = kernel.shape().dims::<4>();
+    let weights: &[f32] = kernel.storage();
+    let mut turned = vec![0.0; weights.len()];
+    each_tap(to, from, |straight, swapped| {
+        turned[swapped] = weights[straight]
+    });
+    flex(turned, [from, to * TAPS])
 }
 
 /// Index of every weight in `[to, from, 3, 3]`, and in `[from, to, 3, 3]` with the kernel turned by half a turn.
@@ -273,6 +295,14 @@ impl<B: Convolve, C: CheckpointStrategy> Convolve for Autodiff<B, C> {
                 let gradient = gradients.consume::<B>(&ops.node);
                 let x = checkpointer.retrieve_node_output::<FloatTensor<B>>(ops.state.0);
                 let kernel = checkpointer.retrieve_node_output::<FloatTensor<B>>(ops.state.1);
+                let [for_x, for_kernel] = &ops.parents;
+                if for_kernel.is_none() {
+                    if let Some(node) = for_x {
+                        let gradient = B::convolve_backward_x(x, kernel, gradient);
+                        gradients.register::<B>(node.id, gradient);
+                    }
+                    return;
+                }
                 for (parent, gradient) in ops
                     .parents
                     .into_iter()

@@ -21,11 +21,11 @@ pub enum InputKind {
 
 /// Sweeps at the levels of side 64, 32, 16, 8, 4, 2. On scarves with holes of 10 to 36 cells these leave a quarter of a cell (RMS)
 /// to the converged harmonic fill, which itself is 2 cells from the truth; four each leave half a cell.
-const SWEEPS: [usize; 6] = [8, 16, 16, 16, 8, 4];
+pub(super) const SWEEPS: [usize; 6] = [8, 16, 16, 16, 8, 4];
 /// A coarse cell counts as known when this share of it is; a quarter means one cell of the finer level.
-const SATURATION: f32 = 4.0;
+pub(super) const SATURATION: f32 = 4.0;
 /// Guards the mean of a coarse cell that holds nothing known.
-const NOTHING: f32 = 1e-6;
+pub(super) const NOTHING: f32 = 1e-6;
 
 /// Fills unknown cells smoothly from the known ones.
 ///

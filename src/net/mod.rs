@@ -2,10 +2,15 @@
 //! Grids in, positions out, in the network's units; the only rooms that know burn are this one and `train`.
 //! No scene space, no constraints, no training, no files: bytes come from the caller.
 
+mod anchor;
 mod convolve;
+pub mod engine;
 mod fill;
 mod frame;
+mod networks;
 mod norm;
+mod shared;
+mod slope;
 mod unet;
 pub mod weights;
 
@@ -21,11 +26,16 @@ use burn::tensor::{Tensor, TensorData};
 
 use crate::grid::{CELLS, NormalGrid, SIDE};
 
+pub use anchor::AnchorLoss;
 pub use convolve::Convolve;
 pub use fill::{InputKind, membrane};
 pub use frame::{Frame, FrameKind};
+pub use networks::Networks;
 pub use unet::{Unet, UnetConfig};
 pub use weights::{TrainingCard, WeightsCard};
+
+use shared::Shared;
+use weights::NamedTensors;
 
 /// Grids that go through the network together; bounds the memory of a call.
 const BATCH: usize = 16;
@@ -51,6 +61,8 @@ pub enum NetError {
     ElementType { name: String, found: String },
     #[error("tensor `{name}` has a value that is not finite")]
     NotFinite { name: String },
+    #[error(transparent)]
+    Engine(#[from] engine::EngineError),
     #[error("backend `{name}` is unknown or not built in; there are: {}", BackendKind::NAMES.join(", "))]
     Backend { name: String },
     #[error("grid {index} has {positions} positions and {known} known flags; both must be {CELLS}")]
@@ -65,11 +77,13 @@ pub enum NetError {
     Answer { index: usize },
 }
 
-/// Which of burn's backends computes.
+/// What computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum BackendKind {
-    /// burn-flex: fast.
+    /// darn's own [`engine`].
     #[default]
+    Engine,
+    /// burn-flex.
     Flex,
     /// burn-ndarray: the numerical reference.
     #[cfg(feature = "ndarray")]
@@ -79,10 +93,10 @@ pub enum BackendKind {
 impl BackendKind {
     /// The names that [`FromStr`] knows in this build.
     #[cfg(feature = "ndarray")]
-    pub const NAMES: &[&str] = &["flex", "ndarray"];
+    pub const NAMES: &[&str] = &["engine", "flex", "ndarray"];
     /// The names that [`FromStr`] knows in this build.
     #[cfg(not(feature = "ndarray"))]
-    pub const NAMES: &[&str] = &["flex"];
+    pub const NAMES: &[&str] = &["engine", "flex"];
 }
 
 impl FromStr for BackendKind {
@@ -90,6 +104,7 @@ impl FromStr for BackendKind {
 
     fn from_str(name: &str) -> Result<Self, NetError> {
         match name {
+            "engine" => Ok(BackendKind::Engine),
             "flex" => Ok(BackendKind::Flex),
             #[cfg(feature = "ndarray")]
             "ndarray" => Ok(BackendKind::Ndarray),
@@ -100,15 +115,38 @@ impl FromStr for BackendKind {
     }
 }
 
+/// What computes a network's answers and its gradients.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Settings {
+    /// Forward passes.
+    pub backend: BackendKind,
+    /// Gradients of the anchor search; the backend's own where there is none.
+    pub autodiff: Option<BackendKind>,
+    /// How darn's own engine computes.
+    pub engine: engine::Options,
+}
+
+impl From<BackendKind> for Settings {
+    fn from(backend: BackendKind) -> Settings {
+        Settings {
+            backend,
+            ..Settings::default()
+        }
+    }
+}
+
 /// A loaded network, ready for inference. Threads share one behind an `Arc`.
 #[derive(Debug)]
 pub struct Network {
-    engine: Engine,
+    forward: Runtime,
+    /// What differentiates, where it is not what predicts.
+    reverse: Option<Runtime>,
     card: WeightsCard,
 }
 
 #[derive(Debug)]
-enum Engine {
+enum Runtime {
+    Engine(Box<Shared>),
     Flex(Unet<Flex>),
     #[cfg(feature = "ndarray")]
     Ndarray(Unet<NdArray>),
@@ -118,20 +156,18 @@ impl Network {
     /// Reads a weights file.
     ///
     /// # Errors
-    /// Whatever is wrong with the file, by the tensor's name; see [`weights::load`].
-    pub fn load(bytes: &[u8], backend: BackendKind) -> Result<Network, NetError> {
-        let (engine, card) = match backend {
-            BackendKind::Flex => {
-                let (unet, card) = weights::load(bytes, &Default::default())?;
-                (Engine::Flex(unet), card)
-            }
-            #[cfg(feature = "ndarray")]
-            BackendKind::Ndarray => {
-                let (unet, card) = weights::load(bytes, &Default::default())?;
-                (Engine::Ndarray(unet), card)
-            }
-        };
-        Ok(Network { engine, card })
+    /// Whatever is wrong with the file, by the tensor's name; see [`weights::load`]. An instruction set that this CPU lacks.
+    pub fn load(bytes: &[u8], settings: impl Into<Settings>) -> Result<Network, NetError> {
+        let settings = settings.into();
+        let (card, tensors) = weights::read(bytes)?;
+        weights::check(&card, &tensors)?;
+        let runtime = |kind: BackendKind| Runtime::new(kind, (&card, &tensors), settings.engine);
+        let reverse = settings.autodiff.filter(|kind| *kind != settings.backend);
+        Ok(Network {
+            forward: runtime(settings.backend)?,
+            reverse: reverse.map(runtime).transpose()?,
+            card,
+        })
     }
 
     /// What the weights are.
@@ -150,12 +186,16 @@ impl Network {
         let config = &self.card.architecture;
         let mut answers = Vec::with_capacity(grids.len());
         for chunk in grids.chunks(BATCH) {
-            let batch = match &self.engine {
-                Engine::Flex(unet) => predict(unet, config, chunk),
+            answers.extend(match &self.forward {
+                Runtime::Engine(engine) => seen(config, chunk, |x, k, n| engine.predict(x, k, n))?,
+                Runtime::Flex(unet) => {
+                    seen(config, chunk, |x, k, n| Ok(predict(unet, config, x, k, n)))?
+                }
                 #[cfg(feature = "ndarray")]
-                Engine::Ndarray(unet) => predict(unet, config, chunk),
-            };
-            answers.extend(batch);
+                Runtime::Ndarray(unet) => {
+                    seen(config, chunk, |x, k, n| Ok(predict(unet, config, x, k, n)))?
+                }
+            });
         }
         match answers
             .iter()
@@ -164,6 +204,76 @@ impl Network {
             Some(index) => Err(NetError::Answer { index }),
             None => Ok(answers),
         }
+    }
+
+    /// The anchor search's loss (paper §3.5) of a target, in the network's units, at each of the uvs; squared cells.
+    ///
+    /// # Errors
+    /// A grid of another size, or one whose values make the answer overflow.
+    pub fn anchor_losses(
+        &self,
+        grid: &NormalGrid,
+        target: [f32; 3],
+        uvs: &[[f32; 2]],
+    ) -> Result<Vec<f32>, NetError> {
+        check_sizes(std::slice::from_ref(grid))?;
+        let config = &self.card.architecture;
+        let mut losses = Vec::with_capacity(uvs.len());
+        for uvs in uvs.chunks(BATCH) {
+            losses.extend(match &self.forward {
+                Runtime::Engine(engine) => slope::losses(engine, config, (grid, target), uvs)?,
+                Runtime::Flex(unet) => anchor::losses(unet, config, (grid, target), uvs)?,
+                #[cfg(feature = "ndarray")]
+                Runtime::Ndarray(unet) => anchor::losses(unet, config, (grid, target), uvs)?,
+            });
+        }
+        Ok(losses)
+    }
+
+    /// The same loss with its gradient.
+    ///
+    /// # Errors
+    /// As of [`Network::anchor_losses`].
+    pub fn anchor_gradients(
+        &self,
+        grid: &NormalGrid,
+        target: [f32; 3],
+        uvs: &[[f32; 2]],
+    ) -> Result<Vec<AnchorLoss>, NetError> {
+        check_sizes(std::slice::from_ref(grid))?;
+        let config = &self.card.architecture;
+        let mut losses = Vec::with_capacity(uvs.len());
+        for uvs in uvs.chunks(BATCH) {
+            losses.extend(match self.reverse.as_ref().unwrap_or(&self.forward) {
+                Runtime::Engine(engine) => slope::gradients(engine, config, (grid, target), uvs)?,
+                Runtime::Flex(unet) => anchor::gradients(unet, config, (grid, target), uvs)?,
+                #[cfg(feature = "ndarray")]
+                Runtime::Ndarray(unet) => anchor::gradients(unet, config, (grid, target), uvs)?,
+            });
+        }
+        Ok(losses)
+    }
+}
+
+impl Runtime {
+    fn new(
+        kind: BackendKind,
+        (card, tensors): (&WeightsCard, &NamedTensors),
+        options: engine::Options,
+    ) -> Result<Runtime, NetError> {
+        let config = &card.architecture;
+        Ok(match kind {
+            BackendKind::Engine => {
+                Runtime::Engine(Box::new(Shared::new(tensors, config, options)?))
+            }
+            BackendKind::Flex => {
+                Runtime::Flex(weights::build(config, tensors, &Default::default())?)
+            }
+            #[cfg(feature = "ndarray")]
+            BackendKind::Ndarray => {
+                Runtime::Ndarray(weights::build(config, tensors, &Default::default())?)
+            }
+        })
     }
 }
 
@@ -181,13 +291,12 @@ fn check_sizes(grids: &[NormalGrid]) -> Result<(), NetError> {
     }
 }
 
-/// One pass of the network over grids of checked size.
-fn predict<B: Convolve>(
-    unet: &Unet<B>,
+/// Grids of checked size turned to the network's frame, shown to it as planes (positions, known, count), its answer turned back.
+fn seen(
     config: &UnetConfig,
     grids: &[NormalGrid],
-) -> Vec<Vec<[f32; 3]>> {
-    let device = B::Device::default();
+    answer: impl FnOnce(Vec<f32>, Vec<f32>, usize) -> Result<Vec<f32>, NetError>,
+) -> Result<Vec<Vec<[f32; 3]>>, NetError> {
     let frames: Vec<Frame> = grids
         .iter()
         .map(|grid| Frame::of(config.frame, grid))
@@ -197,25 +306,34 @@ fn predict<B: Convolve>(
         .zip(&frames)
         .map(|(grid, frame)| grid.positions.iter().map(|p| frame.enter(*p)).collect())
         .collect();
-    let positions = planes(&turned);
     let known: Vec<f32> = grids
         .iter()
         .flat_map(|grid| grid.known.iter().copied())
         .collect();
-    let count = grids.len();
+    let answer = answer(planes(&turned), known, grids.len())?;
+    let cells = answer.chunks_exact(3 * CELLS).map(cells);
+    Ok(cells
+        .zip(&frames)
+        .map(|(cells, frame)| cells.into_iter().map(|p| frame.leave(p)).collect())
+        .collect())
+}
+
+/// One pass of burn's network over planes.
+fn predict<B: Convolve>(
+    unet: &Unet<B>,
+    config: &UnetConfig,
+    positions: Vec<f32>,
+    known: Vec<f32>,
+    count: usize,
+) -> Vec<f32> {
+    let device = B::Device::default();
     let positions = Tensor::from_data(TensorData::new(positions, [count, 3, SIDE, SIDE]), &device);
     let known = Tensor::from_data(TensorData::new(known, [count, 1, SIDE, SIDE]), &device);
-    let answer = unet
-        .predict(config.input, positions, known)
+    unet.predict(config.input, positions, known)
         .into_data()
         .convert::<f32>()
         .into_vec::<f32>()
-        .unwrap_or_default();
-    let cells = answer.chunks_exact(3 * CELLS).map(cells);
-    cells
-        .zip(&frames)
-        .map(|(cells, frame)| cells.into_iter().map(|p| frame.leave(p)).collect())
-        .collect()
+        .unwrap_or_default()
 }
 
 /// Positions of cells as planes: x of all cells, y of all cells, z of all cells, grid after grid.

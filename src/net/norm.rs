@@ -33,12 +33,13 @@ impl<B: Backend> Norm<B> {
 
     /// `[batch, channels, height, width] -> [batch, channels, height, width]`.
     ///
-    /// On an autodiff backend the batch's own statistics are used and remembered; elsewhere the remembered ones.
+    /// While its parameters are trained, the batch's own statistics are used and remembered; otherwise the remembered ones.
     pub fn forward(&self, x: Tensor<B, 4>) -> Tensor<B, 4> {
         let [batch, channels, height, width] = x.dims();
         // One row a channel of an image: the backends have fast paths for a factor by row, and none for one by channel.
         let rows = x.reshape([batch * channels, height * width]);
-        let (mean, variance) = if B::ad_enabled(&rows.device()) {
+        let scale = self.scale.val();
+        let (mean, variance) = if B::ad_enabled(&rows.device()) && scale.is_require_grad() {
             let over_batch = |rows: Tensor<B, 2>| {
                 rows.mean_dim(1)
                     .reshape([batch, channels])
@@ -55,7 +56,7 @@ impl<B: Backend> Norm<B> {
         } else {
             (self.mean.value(), self.variance.value())
         };
-        let factor = self.scale.val().div(variance.add_scalar(EPSILON).sqrt());
+        let factor = scale.div(variance.add_scalar(EPSILON).sqrt());
         let offset = self.shift.val().sub(mean.mul(factor.clone()));
         let by_row = |x: Tensor<B, 1>| {
             x.reshape([1, channels])

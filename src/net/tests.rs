@@ -5,6 +5,7 @@ use burn::tensor::backend::{AutodiffBackend, Backend};
 use burn::tensor::{Distribution, Tensor, TensorData, TensorPrimitive};
 use nalgebra::{Rotation3, Vector3};
 
+use super::engine::reference::Reference;
 use super::weights::{NamedTensors, export, read, write};
 use super::*;
 use crate::grid::cell_centre;
@@ -94,15 +95,17 @@ fn backends_have_names() {
 
 #[cfg(feature = "ndarray")]
 #[test]
-fn flex_agrees_with_the_reference() {
+fn backends_agree_with_the_reference() {
     for input in [InputKind::Membrane, InputKind::Zeros] {
         let config = UnetConfig { input, ..CONFIG };
         let bytes = write(&tensors(config), &card(config)).unwrap();
         let grids = [bent(disk), bent(|i, j| i > 40 || j < 5)];
-        let answers = [BackendKind::Flex, BackendKind::Ndarray]
+        let answers = [BackendKind::Engine, BackendKind::Flex, BackendKind::Ndarray]
             .map(|kind| Network::load(&bytes, kind).unwrap().fill(&grids).unwrap());
-        for (flex, reference) in answers[0].iter().zip(&answers[1]) {
-            assert!(largest_distance(flex, reference) < 1e-4 * CELL);
+        for fast in &answers[..2] {
+            for (fast, reference) in fast.iter().zip(&answers[2]) {
+                assert!(largest_distance(fast, reference) < 1e-4 * CELL);
+            }
         }
         let silent = Network::load(&silent(config), BackendKind::Flex)
             .unwrap()
@@ -434,4 +437,103 @@ fn the_membrane_is_differentiable_in_position_and_mask() {
         (by_mask - slope_mask).abs() < 0.02 * slope_mask.abs().max(0.1),
         "{by_mask} {slope_mask}"
     );
+}
+
+/// The anchor loss in f64, by the plain network.
+fn plain_loss(tensors: &NamedTensors, grid: &NormalGrid, target: [f32; 3], at: [f64; 2]) -> f64 {
+    let config = UnetConfig {
+        frame: FrameKind::Given,
+        ..CONFIG
+    };
+    let bell: Vec<f64> = (0..CELLS)
+        .map(|k| {
+            let off = [(k % SIDE) as f64 - at[0], (k / SIDE) as f64 - at[1]];
+            let sigma = f64::from(anchor::SIGMA);
+            (-0.5 * (off[0] * off[0] + off[1] * off[1]) / (sigma * sigma)).exp()
+        })
+        .collect();
+    let known = |k: usize| f64::from(grid.known[k]);
+    let positions: Vec<f64> = (0..3 * CELLS)
+        .map(|n| {
+            let (axis, k) = (n / CELLS, n % CELLS);
+            known(k) * f64::from(grid.positions[k][axis])
+                + (1.0 - known(k)) * f64::from(target[axis])
+        })
+        .collect();
+    let soft: Vec<f64> = (0..CELLS)
+        .map(|k| known(k) + bell[k] * (1.0 - known(k)))
+        .collect();
+    let answer = Reference { tensors, config }.predict(&positions, &soft);
+    let total: f64 = bell.iter().sum();
+    let off = (0..3).map(|axis| {
+        let plane = &answer[axis * CELLS..][..CELLS];
+        let read: f64 = plane.iter().zip(&bell).map(|(x, b)| x * b).sum();
+        (read / total - f64::from(target[axis])) * SIDE as f64
+    });
+    off.map(|x| x * x).sum()
+}
+
+#[test]
+fn the_anchor_loss_falls_as_its_gradient_says() {
+    let config = UnetConfig {
+        frame: FrameKind::Given,
+        ..CONFIG
+    };
+    let tensors = tensors(config);
+    let bytes = write(&tensors, &card(config)).unwrap();
+    // What is on disk is rounded.
+    let tensors = read(&write(&tensors, &card(config)).unwrap()).unwrap().1;
+    let grid = bent(disk);
+    let target = [0.05, 0.1, 0.2];
+    let uvs = [[0.5, 0.5], [0.47, 0.55], [0.5078125, 0.4765625]];
+    let both = [BackendKind::Flex, BackendKind::Engine];
+    for (kind, uv) in both.into_iter().flat_map(|kind| uvs.map(|uv| (kind, uv))) {
+        let network = Network::load(&bytes, kind).unwrap();
+        let told = network.anchor_gradients(&grid, target, &[uv]).unwrap()[0];
+        let at = uv.map(|x: f32| f64::from(x) * SIDE as f64 - 0.5);
+        let loss = plain_loss(&tensors, &grid, target, at);
+        assert!((f64::from(told.loss) - loss).abs() < 1e-3 * (1.0 + loss));
+        for axis in 0..2 {
+            let step = 1e-6;
+            let moved = |by: f64| {
+                let mut at = at;
+                at[axis] += by;
+                plain_loss(&tensors, &grid, target, at)
+            };
+            let slope = (moved(step) - moved(-step)) / (2.0 * step);
+            let told = f64::from(told.gradient[axis]);
+            assert!(
+                (slope - told).abs() < 0.01 * slope.abs() + 0.005,
+                "{kind:?} {uv:?} {axis}: {slope} {told}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_engines_gradient_is_that_of_burns_autodiff() {
+    for frame in [FrameKind::Canonical, FrameKind::Given] {
+        let config = UnetConfig { frame, ..CONFIG };
+        let bytes = write(&tensors(config), &card(config)).unwrap();
+        let grid = bent(disk);
+        let uvs = [[0.5, 0.5], [0.45, 0.56], [0.52, 0.41]];
+        let by = |settings: Settings| {
+            let network = Network::load(&bytes, settings).unwrap();
+            network
+                .anchor_gradients(&grid, [0.02, 0.1, 0.25], &uvs)
+                .unwrap()
+        };
+        let own = by(BackendKind::Engine.into());
+        let burn = by(Settings {
+            autodiff: Some(BackendKind::Flex),
+            ..Settings::default()
+        });
+        for (own, burn) in own.iter().zip(&burn) {
+            let size = 1.0 + burn.gradient[0].hypot(burn.gradient[1]);
+            assert!((own.loss - burn.loss).abs() < 1e-3 * (1.0 + burn.loss));
+            for (a, b) in own.gradient.iter().zip(burn.gradient) {
+                assert!((a - b).abs() < 2e-3 * size, "{own:?} {burn:?}");
+            }
+        }
+    }
 }

@@ -15,9 +15,9 @@ use super::frame::FrameKind;
 use super::norm::Norm;
 
 /// Positions are multiplied by this on the way in, so that a sheet of width 1 spans a few units.
-const INPUT_SCALE: f32 = 4.0;
+pub(super) const INPUT_SCALE: f32 = 4.0;
 /// One unit of the last layer's output, in the network's units: four cells.
-const OUTPUT_SCALE: f32 = 1.0 / 16.0;
+pub(super) const OUTPUT_SCALE: f32 = 1.0 / 16.0;
 /// Standard deviation of the last layer's initial weights; near zero, so that training starts at the input fill.
 const LAST_LAYER: f64 = 1e-3;
 /// Scales of the U-Net below the first; the grid's side must be divisible by 2 to this power.

@@ -172,6 +172,28 @@ pub fn load<B: Convolve>(
     device: &B::Device,
 ) -> Result<(Unet<B>, WeightsCard), NetError> {
     let (card, tensors) = read(bytes)?;
+    check(&card, &tensors)?;
+    let network = build(&card.architecture, &tensors, device)?;
+    Ok((network, card))
+}
+
+/// The network of some tensors on a backend.
+///
+/// # Errors
+/// What [`import`] refuses.
+pub fn build<B: Convolve>(
+    architecture: &UnetConfig,
+    tensors: &NamedTensors,
+    device: &B::Device,
+) -> Result<Unet<B>, NetError> {
+    import(architecture.init::<B>(device), tensors)
+}
+
+/// Whether a card's width is one that can be built, and that of the tensors beside it.
+///
+/// # Errors
+/// A width outside 1..=256, or another than the last layer's.
+pub fn check(card: &WeightsCard, tensors: &NamedTensors) -> Result<(), NetError> {
     if !(1..=256).contains(&card.architecture.width) {
         return Err(NetError::Card(format!(
             "width {} is outside 1..=256",
@@ -192,8 +214,7 @@ pub fn load<B: Convolve>(
             expected,
         });
     }
-    let network = import(card.architecture.init::<B>(device), &tensors)?;
-    Ok((network, card))
+    Ok(())
 }
 
 /// Elements of a tensor as f32; `None` for other element types.

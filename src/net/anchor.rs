@@ -1,0 +1,154 @@
+//! The loss of the anchor search (paper §3.5): how far the network leaves the cloth from a target that it is given at a place.
+//!
+//! L(u, v) = ‖f(Y(u, v))(u, v) − P‖², where Y has a thin Gaussian of the target P and of its mask at (u, v) in place of a hard cell
+//! ("soft-equal"), and f is read off with the same Gaussian; so L is smooth in (u, v), and burn's autodiff leads through the Gaussian,
+//! the mask, the membrane and the network.
+
+use burn::backend::Autodiff;
+use burn::module::{HasAutodiffModule, Module};
+use burn::tensor::{Tensor, TensorData, backend::Backend};
+
+use super::unet::{Unet, UnetConfig};
+use super::{Convolve, Frame, NetError, planes};
+use crate::grid::{CELLS, NormalGrid, SIDE};
+
+/// Standard deviation of the Gaussian, in cells: at half its height it is 1.3 cells wide.
+pub(super) const SIGMA: f32 = 0.55;
+
+/// The loss of an anchor at a place, and where it falls.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AnchorLoss {
+    /// L, in squared cells (spacings of the grid).
+    pub loss: f32,
+    /// ∂L/∂u and ∂L/∂v, per cell width.
+    pub gradient: [f32; 2],
+}
+
+/// A grid with its target as tensors, in the network's frame.
+struct Stage<B: Backend> {
+    /// The scan's positions where known, the target elsewhere: `[1, 3, 64, 64]`.
+    positions: Tensor<B, 4>,
+    /// `[1, 1, 64, 64]`.
+    known: Tensor<B, 4>,
+    /// `[1, 3]`.
+    target: Tensor<B, 2>,
+}
+
+impl<B: Backend> Stage<B> {
+    fn of(config: &UnetConfig, grid: &NormalGrid, target: [f32; 3]) -> Self {
+        let device = B::Device::default();
+        let (planes, target) = show(config, grid, target);
+        Stage {
+            positions: Tensor::from_data(TensorData::new(planes, [1, 3, SIDE, SIDE]), &device),
+            known: Tensor::from_data(
+                TensorData::new(grid.known.clone(), [1, 1, SIDE, SIDE]),
+                &device,
+            ),
+            target: Tensor::from_data(TensorData::new(target.to_vec(), [1, 3]), &device),
+        }
+    }
+
+    /// L at places `at [n, 2]`, in cells: `[n]`.
+    fn losses(&self, unet: &Unet<B>, config: &UnetConfig, at: Tensor<B, 2>) -> Tensor<B, 1>
+    where
+        B: Convolve,
+    {
+        let [n, _] = at.dims();
+        let along_u = bell(at.clone().narrow(1, 0, 1)).reshape([n, 1, SIDE]);
+        let along_v = bell(at.narrow(1, 1, 1)).reshape([n, SIDE, 1]);
+        let bell = along_v.matmul(along_u).reshape([n, 1, SIDE, SIDE]);
+        let known = self.known.clone().repeat_dim(0, n);
+        let soft = known.clone() + bell.clone() * (known.neg() + 1.0);
+        let answer = unet.predict(config.input, self.positions.clone().repeat_dim(0, n), soft);
+        let weight = bell.reshape([n, 1, CELLS]);
+        let total = weight.clone().sum_dim(2);
+        let read = (answer.reshape([n, 3, CELLS]) * weight.repeat_dim(1, 3)).sum_dim(2);
+        let read = (read / total.repeat_dim(1, 3)).reshape([n, 3]);
+        let off = (read - self.target.clone().repeat_dim(0, n)) * SIDE as f32;
+        off.clone().mul(off).sum_dim(1).reshape([n])
+    }
+}
+
+/// The scan's positions where known, the target elsewhere, as planes `[3, 64, 64]`, and the target; both in the network's frame.
+pub(super) fn show(
+    config: &UnetConfig,
+    grid: &NormalGrid,
+    target: [f32; 3],
+) -> (Vec<f32>, [f32; 3]) {
+    // The anchor itself does not turn the frame: it would make the loss depend on the place in one more way.
+    let frame = Frame::of(config.frame, grid);
+    let target = frame.enter(target);
+    let cells: Vec<[f32; 3]> = (grid.positions.iter().zip(&grid.known))
+        .map(|(p, known)| {
+            let p = frame.enter(*p);
+            std::array::from_fn(|d| known * p[d] + (1.0 - known) * target[d])
+        })
+        .collect();
+    (planes(std::slice::from_ref(&cells)), target)
+}
+
+/// exp(−(k − x)² / 2σ²) at the cells k of a line: `[n, 1] -> [n, 64]`.
+fn bell<B: Backend>(at: Tensor<B, 2>) -> Tensor<B, 2> {
+    let [n, _] = at.dims();
+    let cells: Vec<f32> = (0..SIDE).map(|k| k as f32).collect();
+    let cells = Tensor::<B, 2>::from_data(TensorData::new(cells, [1, SIDE]), &at.device());
+    let off = cells.repeat_dim(0, n) - at.repeat_dim(1, SIDE);
+    (off.clone().mul(off) * (-0.5 / (SIGMA * SIGMA))).exp()
+}
+
+/// Places `[n, 2]` in cells, the centre of cell (i, j) at (i, j), from uvs.
+fn places<B: Backend>(uvs: &[[f32; 2]]) -> Tensor<B, 2> {
+    let cells = uvs.iter().flatten().map(|x| x * SIDE as f32 - 0.5);
+    Tensor::from_data(
+        TensorData::new(cells.collect::<Vec<f32>>(), [uvs.len(), 2]),
+        &B::Device::default(),
+    )
+}
+
+fn numbers<B: Backend, const D: usize>(x: Tensor<B, D>) -> Result<Vec<f32>, NetError> {
+    let numbers = x.into_data().convert::<f32>().into_vec::<f32>();
+    let numbers = numbers.unwrap_or_default();
+    if numbers.iter().all(|x| x.is_finite()) {
+        Ok(numbers)
+    } else {
+        Err(NetError::Answer { index: 0 })
+    }
+}
+
+/// L at uvs.
+pub fn losses<B: Convolve>(
+    unet: &Unet<B>,
+    config: &UnetConfig,
+    (grid, target): (&NormalGrid, [f32; 3]),
+    uvs: &[[f32; 2]],
+) -> Result<Vec<f32>, NetError> {
+    let stage = Stage::<B>::of(config, grid, target);
+    numbers(stage.losses(unet, config, places(uvs)))
+}
+
+/// L at uvs and its gradient. The network's parameters are frozen, so that nothing is spent on theirs.
+pub fn gradients<B>(
+    unet: &Unet<B>,
+    config: &UnetConfig,
+    (grid, target): (&NormalGrid, [f32; 3]),
+    uvs: &[[f32; 2]],
+) -> Result<Vec<AnchorLoss>, NetError>
+where
+    B: Convolve,
+    Unet<B>: HasAutodiffModule<Autodiff<B>, TrainModule = Unet<Autodiff<B>>>,
+{
+    let unet: Unet<Autodiff<B>> = unet.clone().train().no_grad();
+    let stage = Stage::<Autodiff<B>>::of(config, grid, target);
+    let at = places::<Autodiff<B>>(uvs).require_grad();
+    let losses = stage.losses(&unet, config, at.clone());
+    let gradients = losses.clone().sum().backward();
+    let slopes = match at.grad(&gradients) {
+        Some(slopes) => numbers(slopes)?,
+        None => vec![0.0; 2 * uvs.len()],
+    };
+    let losses = numbers(losses.inner())?;
+    let pairs = slopes.chunks_exact(2).map(|g| [g[0], g[1]]);
+    Ok((losses.into_iter().zip(pairs))
+        .map(|(loss, gradient)| AnchorLoss { loss, gradient })
+        .collect())
+}

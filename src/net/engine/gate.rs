@@ -1,0 +1,351 @@
+//! The attention gate: two 1×1 convolutions, a score, and the skip weighted by it; and its adjoint. Sixteen cells at a time.
+
+use std::ops::Range;
+
+use super::convolve::{Multiply, Work};
+use super::map::{Map, panels};
+use super::network::GateFolds;
+use super::pack::{Parts, matrix, vector};
+use super::simd::{Block, Kernel, Simd, Target};
+
+/// Cells that go through together.
+const CELLS: usize = 16;
+
+/// A gate's weights, ready.
+#[derive(Debug, Clone)]
+pub struct Gate {
+    /// Panels of the skip, and as many of the signal.
+    panels: usize,
+    /// Panels of the joint features.
+    pub inner: usize,
+    /// `[panel of the joint][channel of skip and signal]`.
+    weights: Vec<Block>,
+    bias: Vec<Block>,
+    score: Vec<Block>,
+    score_bias: f32,
+}
+
+/// A gate's adjoint, ready: `[panel of skip and signal][channel of the joint]`.
+#[derive(Debug, Clone)]
+pub struct GateAdjoint {
+    weights: Vec<Block>,
+}
+
+impl Gate {
+    pub fn pack(folds: &GateFolds) -> Gate {
+        let (channels, inner) = (folds.joint.from / 2, folds.joint.to);
+        Gate {
+            panels: panels(channels),
+            inner: panels(inner),
+            weights: matrix(&folds.joint, [Parts(channels), Parts(inner)]),
+            bias: vector(&folds.joint.bias, Parts(inner)),
+            score: vector(&folds.score, Parts(inner)),
+            score_bias: folds.score_bias,
+        }
+    }
+
+    /// Weights the skip's cells: `joined` holds the signal in its upper half of panels and receives the weighted skip in its lower half.
+    ///
+    /// `open` receives every cell's weight, `joint`, if any, its joint features.
+    pub fn run(
+        &self,
+        (target, work): (Target, &mut Work),
+        images: usize,
+        (skip, joined): (&Map, &mut Map),
+        open: &mut [f32],
+        mut joint: Option<&mut [Block]>,
+    ) {
+        let spans = Spans::new(skip.side);
+        let cells = images * skip.side * skip.side;
+        for first in (0..cells).step_by(CELLS) {
+            let count = CELLS.min(cells - first);
+            for (span, place, image) in spans.of(first..first + count) {
+                for panel in 0..self.panels {
+                    let from = skip.index([image, panel], place);
+                    let to = &mut work.input[panel * CELLS + span..][..spans.length];
+                    to.copy_from_slice(&skip.blocks[from..][..spans.length]);
+                    let signal = self.panels + panel;
+                    let from = joined.index([image, signal], place);
+                    let to = &mut work.input[signal * CELLS + span..][..spans.length];
+                    to.copy_from_slice(&joined.blocks[from..][..spans.length]);
+                }
+            }
+            target.run(Multiply {
+                input: &work.input,
+                depth: 2 * self.panels,
+                weights: &self.weights,
+                frequencies: 1,
+                count,
+                products: &mut work.products,
+            });
+            let mut weights = Block::ZERO;
+            target.run(Open {
+                gate: self,
+                cells: &mut work.input,
+                products: &mut work.products,
+                open: &mut weights,
+            });
+            open[first..first + count].copy_from_slice(&weights.0[..count]);
+            if let Some(joint) = joint.as_deref_mut() {
+                for panel in 0..self.inner {
+                    for cell in 0..count {
+                        joint[(first + cell) * self.inner + panel] =
+                            work.products[panel * (CELLS + 1) + cell];
+                    }
+                }
+            }
+            for (span, place, image) in spans.of(first..first + count) {
+                for panel in 0..self.panels {
+                    let to = joined.index([image, panel], place);
+                    let to = &mut joined.blocks[to..][..spans.length];
+                    to.copy_from_slice(&work.input[panel * CELLS + span..][..spans.length]);
+                }
+            }
+        }
+    }
+}
+
+/// Runs of cells of one row, of equal length, at most [`CELLS`].
+#[derive(Clone, Copy)]
+struct Spans {
+    side: usize,
+    length: usize,
+}
+
+impl Spans {
+    fn new(side: usize) -> Spans {
+        let length = side.min(CELLS);
+        Spans { side, length }
+    }
+
+    /// Of each run among some cells of a batch: its offset among them, its row and column counted from the border, and its image.
+    #[inline(always)]
+    fn of(self, cells: Range<usize>) -> impl Iterator<Item = (usize, [usize; 2], usize)> {
+        let area = self.side * self.side;
+        cells.clone().step_by(self.length).map(move |cell| {
+            let inside = cell % area;
+            let place = [inside / self.side + 1, inside % self.side + 1];
+            (cell - cells.start, place, cell / area)
+        })
+    }
+}
+
+/// Joint features (in place of the products) and weights of sixteen cells, and the skip's cells weighted in place.
+struct Open<'a> {
+    gate: &'a Gate,
+    /// `[panel][cell]`.
+    cells: &'a mut [Block],
+    products: &'a mut [Block],
+    open: &'a mut Block,
+}
+
+impl Kernel for Open<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) {
+        for cell in 0..CELLS {
+            let mut sum = s.splat(0.0);
+            for panel in 0..self.gate.inner {
+                let joint = &mut self.products[panel * (CELLS + 1) + cell];
+                let x = s.add(s.load(joint), s.load(&self.gate.bias[panel]));
+                let x = s.max(x, s.splat(0.0));
+                s.store(x, joint);
+                sum = s.mul_add(x, s.load(&self.gate.score[panel]), sum);
+            }
+            let mut block = Block::ZERO;
+            s.store(sum, &mut block);
+            self.open.0[cell] = block.sum() + self.gate.score_bias;
+        }
+        for x in &mut self.open.0 {
+            *x = 1.0 / (1.0 + exp(-x.clamp(-80.0, 80.0)));
+        }
+        let cells = self.cells.chunks_mut(CELLS).take(self.gate.panels);
+        for cells in cells {
+            for (cell, open) in cells.iter_mut().zip(self.open.0) {
+                s.store(s.mul(s.load(cell), s.splat(open)), cell);
+            }
+        }
+    }
+}
+
+/// eˣ for |x| ≤ 80, within 2e-7 of its value: plain arithmetic, so that it is the same on every CPU and sixteen go at once.
+#[inline(always)]
+fn exp(x: f32) -> f32 {
+    /// Adding it rounds to a whole number.
+    const ROUND: f32 = 12_582_912.0;
+    /// ln 2 as a number of few bits and the rest.
+    const LN2: [f32; 2] = [0.693_359_4, -2.121_944_4e-4];
+    let whole = (x * std::f32::consts::LOG2_E + ROUND) - ROUND;
+    let r = x - whole * LN2[0] - whole * LN2[1];
+    let mut sum = 1.0 / 5040.0;
+    for c in [
+        1.0 / 720.0,
+        1.0 / 120.0,
+        1.0 / 24.0,
+        1.0 / 6.0,
+        0.5,
+        1.0,
+        1.0,
+    ] {
+        sum = sum * r + c;
+    }
+    // |whole| ≤ 116, so the exponent stays in range.
+    let power = ((whole as i32 + 127) << 23) as u32;
+    sum * f32::from_bits(power)
+}
+
+impl GateAdjoint {
+    pub fn pack(folds: &GateFolds) -> GateAdjoint {
+        let (channels, inner) = (folds.joint.from / 2, folds.joint.to);
+        GateAdjoint {
+            weights: matrix(
+                &folds.joint.adjoint(super::pack::Turn::Not),
+                [Parts(inner), Parts(channels)],
+            ),
+        }
+    }
+
+    /// `gradient`, with respect to the gate's output and the signal beside it, becomes the one with respect to the skip and to the signal
+    /// before its ReLU. `skip`, `joined`, `open` and `joint` are the forward pass's.
+    pub fn run(
+        &self,
+        (target, work): (Target, &mut Work),
+        gate: &Gate,
+        (skip, joined): (&Map, &Map),
+        (open, joint): (&[f32], &[Block]),
+        gradient: &mut Map,
+    ) {
+        for (first, (open, joint)) in open
+            .chunks(CELLS)
+            .zip(joint.chunks(CELLS * gate.inner))
+            .enumerate()
+        {
+            let mut run = Run {
+                gate,
+                first: first * CELLS,
+                skip,
+                joined,
+                open,
+                gradient,
+            };
+            target.run(Enter {
+                run: &run,
+                joint,
+                input: &mut work.input,
+            });
+            target.run(Multiply {
+                input: &work.input,
+                depth: gate.inner,
+                weights: &self.weights,
+                frequencies: 1,
+                count: open.len(),
+                products: &mut work.products,
+            });
+            target.run(Leave {
+                run: &mut run,
+                products: &work.products,
+            });
+        }
+    }
+}
+
+/// Sixteen cells of a gate's adjoint.
+struct Run<'a> {
+    gate: &'a Gate,
+    first: usize,
+    skip: &'a Map,
+    joined: &'a Map,
+    open: &'a [f32],
+    gradient: &'a mut Map,
+}
+
+/// The gradient with respect to the joint features before their ReLU.
+struct Enter<'a, 'b> {
+    run: &'a Run<'b>,
+    joint: &'a [Block],
+    input: &'a mut [Block],
+}
+
+impl Kernel for Enter<'_, '_> {
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) {
+        let Run {
+            gate, first, open, ..
+        } = *self.run;
+        let (skip, gradient) = (self.run.skip, &*self.run.gradient);
+        let spans = Spans::new(skip.side);
+        for (span, place, image) in spans.of(first..first + open.len()) {
+            let mut sums = [s.splat(0.0); CELLS];
+            for panel in 0..gate.panels {
+                let by = &gradient.blocks[gradient.index([image, panel], place)..][..spans.length];
+                let x = &skip.blocks[skip.index([image, panel], place)..][..spans.length];
+                for (sum, (by, x)) in sums.iter_mut().zip(by.iter().zip(x)) {
+                    *sum = s.mul_add(s.load(by), s.load(x), *sum);
+                }
+            }
+            for (cell, sum) in (span..span + spans.length).zip(sums) {
+                let mut block = Block::ZERO;
+                s.store(sum, &mut block);
+                let slope = s.splat(block.sum() * open[cell] * (1.0 - open[cell]));
+                for (panel, score) in gate.score.iter().enumerate() {
+                    let joint = s.load(&self.joint[cell * gate.inner + panel]);
+                    let by = s.gate(s.mul(slope, s.load(score)), joint);
+                    s.store(by, &mut self.input[panel * CELLS + cell]);
+                }
+            }
+        }
+    }
+}
+
+/// Adds what came through the joint features.
+struct Leave<'a, 'b> {
+    run: &'a mut Run<'b>,
+    products: &'a [Block],
+}
+
+impl Kernel for Leave<'_, '_> {
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) {
+        let Run {
+            gate,
+            first,
+            joined,
+            open,
+            ..
+        } = *self.run;
+        let gradient = &mut *self.run.gradient;
+        let spans = Spans::new(joined.side);
+        for (span, place, image) in spans.of(first..first + open.len()) {
+            for panel in 0..gate.panels {
+                let start = gradient.index([image, panel], place);
+                let by = &mut gradient.blocks[start..][..spans.length];
+                let products = &self.products[panel * (CELLS + 1) + span..][..spans.length];
+                for ((by, product), open) in by.iter_mut().zip(products).zip(&open[span..]) {
+                    s.store(s.mul_add(s.load(by), s.splat(*open), s.load(product)), by);
+                }
+                let signal = gate.panels + panel;
+                let start = gradient.index([image, signal], place);
+                let by = &mut gradient.blocks[start..][..spans.length];
+                let saved = &joined.blocks[start..][..spans.length];
+                let products = &self.products[signal * (CELLS + 1) + span..][..spans.length];
+                for ((by, product), saved) in by.iter_mut().zip(products).zip(saved) {
+                    let sum = s.add(s.load(by), s.load(product));
+                    s.store(s.gate(sum, s.load(saved)), by);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::exp;
+
+    #[test]
+    fn the_exponential_is_the_exponential() {
+        for i in -8000..=8000 {
+            let x = i as f32 / 100.0;
+            let truth = f64::from(x).exp();
+            assert!(((f64::from(exp(x)) - truth) / truth).abs() < 4e-7, "{x}");
+        }
+    }
+}

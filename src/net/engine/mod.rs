@@ -1,0 +1,218 @@
+//! The network's own engine: exactly the attention U-Net of [`crate::net::Unet`], its forward pass and its input gradient, on the CPU.
+//! Weights come as named tensors, grids as planes; burn is the reference it is tested against.
+//! No burn, no files, no training; and no `unsafe` but in `simd.rs`.
+
+mod backward;
+mod convolve;
+mod forward;
+mod gate;
+mod map;
+mod membrane;
+mod network;
+mod pack;
+mod scheme;
+mod scratch;
+mod simd;
+
+#[cfg(test)]
+pub(super) mod reference;
+#[cfg(test)]
+mod tests;
+
+use std::sync::OnceLock;
+
+use crate::grid::CELLS;
+use crate::net::UnetConfig;
+use crate::net::weights::NamedTensors;
+
+use network::{Folds, Forward, Reverse};
+use simd::Target;
+
+pub use scratch::Scratch;
+pub use simd::{Isa, UnknownIsa};
+
+/// A tensor as weights files give it.
+type Tensor = (Vec<usize>, Vec<f32>);
+
+/// Widths that can be built.
+const WIDTHS: std::ops::RangeInclusive<usize> = 1..=256;
+
+/// Why an engine could not be built, or not be asked.
+#[derive(Debug, thiserror::Error)]
+pub enum EngineError {
+    #[error("tensor `{name}` is missing")]
+    MissingTensor { name: String },
+    #[error("tensor `{name}` has shape {found:?}, expected {expected:?}")]
+    Shape {
+        name: String,
+        found: Vec<usize>,
+        expected: Vec<usize>,
+    },
+    #[error("width {width} is outside 1..=256")]
+    Width { width: usize },
+    #[error("this CPU has no {}", isa.name())]
+    Isa { isa: Isa },
+    #[error("`{what}` holds {found} values, expected {expected} for {images} grid(s)")]
+    Size {
+        what: &'static str,
+        found: usize,
+        expected: usize,
+        images: usize,
+    },
+}
+
+/// How an engine computes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Options {
+    /// The instruction set; the CPU's best where there is none.
+    pub isa: Option<Isa>,
+    /// Threads that share a call's grids; one grid is one thread's.
+    pub threads: usize,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options {
+            isa: None,
+            threads: 1,
+        }
+    }
+}
+
+/// A network, ready to be asked; shared between threads, each with a [`Scratch`] of its own.
+#[derive(Debug)]
+pub struct Engine {
+    config: UnetConfig,
+    target: Target,
+    threads: usize,
+    folds: Folds,
+    forward: Forward,
+    reverse: OnceLock<Reverse>,
+}
+
+/// What a scalar gains by each number of a grid's prediction: given the grid's place in the call and its prediction `[3, 64, 64]`, fills in
+/// the derivatives `[3, 64, 64]`. Called once a grid, on any thread.
+pub type Cotangent<'a> = dyn Fn(usize, &[f32], &mut [f32]) + Sync + 'a;
+
+/// Gradients of a prediction's planes times a cotangent, and the prediction.
+pub struct Gradient<'a> {
+    /// `[n, 3, 64, 64]`.
+    pub prediction: &'a mut [f32],
+    /// `[n, 3, 64, 64]`.
+    pub by_positions: &'a mut [f32],
+    /// `[n, 1, 64, 64]`.
+    pub by_known: &'a mut [f32],
+}
+
+impl Engine {
+    /// Folds batch norm into the weights and lays them out for the kernels.
+    ///
+    /// # Errors
+    /// A tensor that is missing or has another shape, a width outside 1..=256, an instruction set that this CPU lacks.
+    pub fn new(
+        tensors: &NamedTensors,
+        config: &UnetConfig,
+        options: Options,
+    ) -> Result<Engine, EngineError> {
+        let width = config.width;
+        if !WIDTHS.contains(&width) {
+            return Err(EngineError::Width { width });
+        }
+        let target = match options.isa {
+            Some(isa) => Target::new(isa).ok_or(EngineError::Isa { isa })?,
+            None => Target::best(),
+        };
+        let folds = Folds::read(tensors, width)?;
+        Ok(Engine {
+            config: *config,
+            target,
+            threads: options.threads.max(1),
+            forward: Forward::pack(&folds),
+            folds,
+            reverse: OnceLock::new(),
+        })
+    }
+
+    /// The instruction set in use.
+    pub fn isa(&self) -> Isa {
+        self.target.isa()
+    }
+
+    /// Predicts all cells of some grids, in the network's units: what `Unet::predict` does.
+    ///
+    /// `positions [n, 3, 64, 64]`, `known [n, 1, 64, 64]` in 0..=1 `-> out [n, 3, 64, 64]`. A grid's answer is the same to the bit in any
+    /// company and on any number of threads. Allocates only when the scratch has not seen as many grids before.
+    ///
+    /// # Errors
+    /// Slices whose lengths are not those of the same number of grids.
+    pub fn predict(
+        &self,
+        scratch: &mut Scratch,
+        positions: &[f32],
+        known: &[f32],
+        out: &mut [f32],
+    ) -> Result<(), EngineError> {
+        let images = known.len() / CELLS;
+        check(
+            images,
+            [
+                ("known", known.len(), 1),
+                ("positions", positions.len(), 3),
+                ("out", out.len(), 3),
+            ],
+        )?;
+        scratch.predict(self, images, (positions, known), out);
+        Ok(())
+    }
+
+    /// Predicts, and differentiates Σ cotangent · prediction with respect to positions and mask; see [`Cotangent`].
+    ///
+    /// The rest as [`Engine::predict`]. The first call prepares the adjoint weights.
+    ///
+    /// # Errors
+    /// Slices whose lengths are not those of the same number of grids.
+    pub fn gradient(
+        &self,
+        scratch: &mut Scratch,
+        (positions, known): (&[f32], &[f32]),
+        cotangent: &Cotangent,
+        out: Gradient,
+    ) -> Result<(), EngineError> {
+        let images = known.len() / CELLS;
+        check(
+            images,
+            [
+                ("known", known.len(), 1),
+                ("positions", positions.len(), 3),
+                ("prediction", out.prediction.len(), 3),
+                ("by_positions", out.by_positions.len(), 3),
+                ("by_known", out.by_known.len(), 1),
+            ],
+        )?;
+        scratch.gradient(self, images, (positions, known), cotangent, out);
+        Ok(())
+    }
+
+    /// The adjoint layers, prepared when first wanted.
+    fn reverse(&self) -> &Reverse {
+        self.reverse.get_or_init(|| Reverse::pack(&self.folds))
+    }
+}
+
+fn check<const N: usize>(
+    images: usize,
+    slices: [(&'static str, usize, usize); N],
+) -> Result<(), EngineError> {
+    for (what, found, planes) in slices {
+        let expected = images * planes * CELLS;
+        if found != expected {
+            return Err(EngineError::Size {
+                what,
+                found,
+                expected,
+                images,
+            });
+        }
+    }
+    Ok(())
+}

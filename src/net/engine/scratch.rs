@@ -1,0 +1,394 @@
+//! A caller's room for calls, and a call's way: input planes to maps, the network, maps to planes; grids shared out to threads.
+
+use rayon::prelude::*;
+
+use super::backward::Gradients;
+use super::forward::{Activations, Saved};
+use super::map::Map;
+use super::membrane::{Pyramid, adjoint, membrane};
+use super::simd::{Block, Kernel, LANES, Simd};
+use super::{Cotangent, Engine, Gradient};
+use crate::grid::{CELLS, SIDE};
+use crate::net::InputKind;
+use crate::net::unet::{INPUT_SCALE, OUTPUT_SCALE};
+
+/// Grids that go through the layers together: more share the reading of the weights, fewer stay in the cache.
+const TOGETHER: usize = 4;
+
+/// Room for the calls of one thread, for one engine; it grows to what is asked and is kept.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    lanes: Vec<Lane>,
+}
+
+/// One thread's room.
+#[derive(Debug, Default)]
+struct Lane {
+    forward: Option<Activations>,
+    backward: Option<(Saved, Gradients)>,
+    pyramid: Pyramid,
+    /// Planes of one grid.
+    planes: Vec<f32>,
+    /// By the prediction's planes, grid after grid.
+    cotangents: Vec<f32>,
+}
+
+/// Some grids of a call of [`Engine::predict`].
+struct Grids<'a> {
+    positions: &'a [f32],
+    known: &'a [f32],
+    out: &'a mut [f32],
+}
+
+impl Scratch {
+    pub(super) fn predict(
+        &mut self,
+        engine: &Engine,
+        images: usize,
+        (positions, known): (&[f32], &[f32]),
+        out: &mut [f32],
+    ) {
+        let share = self.share(engine, images);
+        let work = |lane: &mut Lane, grids: Grids| {
+            let parts = grids.positions.chunks(TOGETHER * 3 * CELLS);
+            let parts = parts.zip(grids.known.chunks(TOGETHER * CELLS));
+            for ((positions, known), out) in parts.zip(grids.out.chunks_mut(TOGETHER * 3 * CELLS)) {
+                lane.predict(
+                    engine,
+                    Grids {
+                        positions,
+                        known,
+                        out,
+                    },
+                );
+            }
+        };
+        if share >= images {
+            if let Some(lane) = self.lanes.first_mut() {
+                work(
+                    lane,
+                    Grids {
+                        positions,
+                        known,
+                        out,
+                    },
+                );
+            }
+            return;
+        }
+        self.lanes
+            .par_iter_mut()
+            .zip(positions.par_chunks(share * 3 * CELLS))
+            .zip(known.par_chunks(share * CELLS))
+            .zip(out.par_chunks_mut(share * 3 * CELLS))
+            .for_each(|(((lane, positions), known), out)| {
+                work(
+                    lane,
+                    Grids {
+                        positions,
+                        known,
+                        out,
+                    },
+                );
+            });
+    }
+
+    pub(super) fn gradient(
+        &mut self,
+        engine: &Engine,
+        images: usize,
+        (positions, known): (&[f32], &[f32]),
+        cotangent: &Cotangent,
+        out: Gradient,
+    ) {
+        let share = self.share(engine, images);
+        let work = |lane: &mut Lane, first: usize, x: (&[f32], &[f32]), out: Gradient| {
+            let parts = (x.0.chunks(TOGETHER * 3 * CELLS)).zip(x.1.chunks(TOGETHER * CELLS));
+            let outs = (out.prediction.chunks_mut(TOGETHER * 3 * CELLS))
+                .zip(out.by_positions.chunks_mut(TOGETHER * 3 * CELLS))
+                .zip(out.by_known.chunks_mut(TOGETHER * CELLS));
+            let numbered = (first..).step_by(TOGETHER).zip(parts.zip(outs));
+            for (first, (x, ((prediction, by_positions), by_known))) in numbered {
+                let out = Gradient {
+                    prediction,
+                    by_positions,
+                    by_known,
+                };
+                lane.gradient(engine, x, (first, cotangent), out);
+            }
+        };
+        if share >= images {
+            if let Some(lane) = self.lanes.first_mut() {
+                work(lane, 0, (positions, known), out);
+            }
+            return;
+        }
+        let x = (positions.par_chunks(share * 3 * CELLS)).zip(known.par_chunks(share * CELLS));
+        let out = (out.prediction.par_chunks_mut(share * 3 * CELLS))
+            .zip(out.by_positions.par_chunks_mut(share * 3 * CELLS))
+            .zip(out.by_known.par_chunks_mut(share * CELLS));
+        let lanes = self.lanes.par_iter_mut().enumerate();
+        lanes.zip(x).zip(out).for_each(
+            |(((place, lane), x), ((prediction, by_positions), by_known))| {
+                let out = Gradient {
+                    prediction,
+                    by_positions,
+                    by_known,
+                };
+                work(lane, place * share, x, out);
+            },
+        );
+    }
+
+    /// Grids a thread takes; makes sure that there are lanes for all.
+    fn share(&mut self, engine: &Engine, images: usize) -> usize {
+        let share = images.div_ceil(engine.threads).max(1);
+        let lanes = images.div_ceil(share).max(1);
+        if self.lanes.len() < lanes {
+            self.lanes.resize_with(lanes, Lane::default);
+        }
+        share
+    }
+}
+
+impl Lane {
+    /// Predicts at most [`TOGETHER`] grids.
+    fn predict(&mut self, engine: &Engine, grids: Grids) {
+        let images = grids.known.len() / CELLS;
+        let (target, network) = (engine.target, &engine.forward);
+        let room = Lane::room(&mut self.forward, engine, images);
+        for image in 0..images {
+            let (x, known) = (image3(grids.positions, image), image1(grids.known, image));
+            let out = image3_mut(grids.out, image);
+            enter(engine, &mut self.pyramid, (x, known), out);
+            lay_out((out, known), image, &mut room.input);
+        }
+        let features = room.run(target, images, network, None);
+        for image in 0..images {
+            target.run(Last {
+                engine,
+                features,
+                image,
+                out: image3_mut(grids.out, image),
+            });
+        }
+    }
+
+    /// Predicts and differentiates at most [`TOGETHER`] grids.
+    fn gradient(
+        &mut self,
+        engine: &Engine,
+        (positions, known): (&[f32], &[f32]),
+        (first, cotangent): (usize, &Cotangent),
+        out: Gradient,
+    ) {
+        let images = known.len() / CELLS;
+        let (target, network, reverse) = (engine.target, &engine.forward, engine.reverse());
+        let room = Lane::room(&mut self.forward, engine, images);
+        let fits = |(_, gradients): &(Saved, Gradients)| gradients.images() >= images;
+        if !self.backward.as_ref().is_some_and(fits) {
+            let saved = Saved::new(images, &engine.folds, network);
+            self.backward = Some((saved, Gradients::new(images, &engine.folds, reverse)));
+            self.planes.resize(3 * CELLS, 0.0);
+            self.cotangents.resize(images * 3 * CELLS, 0.0);
+        }
+        let Some((saved, gradients)) = &mut self.backward else {
+            return;
+        };
+        for image in 0..images {
+            let (x, known) = (image3(positions, image), image1(known, image));
+            let filled = image3_mut(out.prediction, image);
+            enter(engine, &mut self.pyramid, (x, known), filled);
+            lay_out((filled, known), image, &mut room.input);
+        }
+        let features = room.run(target, images, network, Some(saved));
+        for image in 0..images {
+            target.run(Last {
+                engine,
+                features,
+                image,
+                out: image3_mut(out.prediction, image),
+            });
+            let by_prediction = image3_mut(&mut self.cotangents, image);
+            cotangent(first + image, image3(out.prediction, image), by_prediction);
+            target.run(LastAdjoint {
+                engine,
+                features,
+                image,
+                cotangent: by_prediction,
+                result: &mut gradients.result[0],
+            });
+        }
+        gradients.run(target, images, (network, reverse), (room, saved));
+        for image in 0..images {
+            let (x, known) = (image3(positions, image), image1(known, image));
+            let by_positions = image3_mut(out.by_positions, image);
+            let by_known = &mut out.by_known[image * CELLS..][..CELLS];
+            by_positions.fill(0.0);
+            take_out(&gradients.input, image, (&mut self.planes, by_known));
+            match engine.config.input {
+                InputKind::Zeros => {
+                    for (at, by) in self.planes.iter().enumerate() {
+                        by_positions[at] = by * known[at % CELLS];
+                        by_known[at % CELLS] += by * x[at];
+                    }
+                }
+                InputKind::Membrane => {
+                    for (by, direct) in self.planes.iter_mut().zip(image3(&self.cotangents, image))
+                    {
+                        *by += direct;
+                    }
+                    let by = (by_positions, by_known);
+                    adjoint(target, &mut self.pyramid, (x, known), &self.planes, by);
+                }
+            }
+        }
+    }
+
+    /// Room for a forward pass of so many grids.
+    fn room<'a>(
+        room: &'a mut Option<Activations>,
+        engine: &Engine,
+        images: usize,
+    ) -> &'a mut Activations {
+        let old = room.take().filter(|room| room.images >= images);
+        room.insert(old.unwrap_or_else(|| Activations::new(images, &engine.folds, &engine.forward)))
+    }
+}
+
+fn image3(planes: &[f32], image: usize) -> &[f32] {
+    &planes[image * 3 * CELLS..][..3 * CELLS]
+}
+
+fn image3_mut(planes: &mut [f32], image: usize) -> &mut [f32] {
+    &mut planes[image * 3 * CELLS..][..3 * CELLS]
+}
+
+fn image1(planes: &[f32], image: usize) -> &[f32] {
+    &planes[image * CELLS..][..CELLS]
+}
+
+/// One grid's positions as the network sees them, but for their scale.
+fn enter(
+    engine: &Engine,
+    pyramid: &mut Pyramid,
+    (positions, known): (&[f32], &[f32]),
+    filled: &mut [f32],
+) {
+    match engine.config.input {
+        InputKind::Membrane => membrane(engine.target, pyramid, (positions, known), filled),
+        InputKind::Zeros => {
+            for (at, to) in filled.iter_mut().enumerate() {
+                *to = positions[at] * known[at % CELLS];
+            }
+        }
+    }
+}
+
+/// Three planes, scaled, and the mask as the channels of one panel.
+fn lay_out((filled, known): (&[f32], &[f32]), image: usize, input: &mut Map) {
+    for row in 0..SIDE {
+        for (column, to) in input.row_mut([image, 0], row).iter_mut().enumerate() {
+            let cell = row * SIDE + column;
+            for axis in 0..3 {
+                to.0[axis] = filled[axis * CELLS + cell] * INPUT_SCALE;
+            }
+            to.0[3] = known[cell];
+        }
+    }
+}
+
+/// The adjoint of [`lay_out`].
+fn take_out(input: &Map, image: usize, (by_filled, by_known): (&mut [f32], &mut [f32])) {
+    for row in 0..SIDE {
+        for (column, from) in input.row([image, 0], row).iter().enumerate() {
+            let cell = row * SIDE + column;
+            for axis in 0..3 {
+                by_filled[axis * CELLS + cell] = from.0[axis] * INPUT_SCALE;
+            }
+            by_known[cell] = from.0[3];
+        }
+    }
+}
+
+/// The last layer: features to positions, added to the membrane in `out` or put in its place.
+struct Last<'a> {
+    engine: &'a Engine,
+    features: &'a Map,
+    image: usize,
+    out: &'a mut [f32],
+}
+
+impl Kernel for Last<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) {
+        let folds = &self.engine.folds;
+        for axis in 0..3 {
+            let weights = &folds.last[axis * folds.width..][..folds.width];
+            for row in 0..SIDE {
+                let out = &mut self.out[axis * CELLS + row * SIDE..][..SIDE];
+                for (column, out) in out.iter_mut().enumerate() {
+                    let mut sum = s.splat(0.0);
+                    for (panel, weights) in weights.chunks(LANES).enumerate() {
+                        let place = [self.image, panel];
+                        let place = self.features.index(place, [row + 1, column + 1]);
+                        let x = s.load(&self.features.blocks[place]);
+                        sum = s.mul_add(x, s.load(&padded(weights)), sum);
+                    }
+                    let mut block = Block::ZERO;
+                    s.store(sum, &mut block);
+                    let x = (block.sum() + folds.last_bias[axis]) * OUTPUT_SCALE;
+                    *out = match self.engine.config.input {
+                        InputKind::Membrane => *out + x,
+                        InputKind::Zeros => x,
+                    };
+                }
+            }
+        }
+    }
+}
+
+/// Up to sixteen weights, zeros after them.
+#[inline(always)]
+fn padded(weights: &[f32]) -> Block {
+    let mut block = Block::ZERO;
+    block.0[..weights.len()].copy_from_slice(weights);
+    block
+}
+
+/// The gradient with respect to the features before their ReLU.
+struct LastAdjoint<'a> {
+    engine: &'a Engine,
+    features: &'a Map,
+    image: usize,
+    cotangent: &'a [f32],
+    result: &'a mut Map,
+}
+
+impl Kernel for LastAdjoint<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) {
+        let folds = &self.engine.folds;
+        for panel in 0..self.features.panels {
+            let weights = |axis: usize| {
+                let row = &folds.last[axis * folds.width..][..folds.width];
+                s.load(&padded(
+                    &row[panel * LANES..folds.width.min((panel + 1) * LANES)],
+                ))
+            };
+            let weights = [weights(0), weights(1), weights(2)];
+            for row in 0..SIDE {
+                let saved = self.features.row([self.image, panel], row);
+                let to = self.result.row_mut([self.image, panel], row);
+                for (column, (to, saved)) in to.iter_mut().zip(saved).enumerate() {
+                    let mut sum = s.splat(0.0);
+                    for (axis, weights) in weights.iter().enumerate() {
+                        let by = self.cotangent[axis * CELLS + row * SIDE + column] * OUTPUT_SCALE;
+                        sum = s.mul_add(s.splat(by), *weights, sum);
+                    }
+                    s.store(s.gate(sum, s.load(saved)), to);
+                }
+            }
+        }
+    }
+}
