@@ -6,8 +6,12 @@
 use nalgebra::{Matrix2, Matrix3x2};
 
 use crate::flatten::RestTriangle;
-use crate::flatten::cholesky::{NotPositive, Symmetric};
+use crate::flatten::cholesky::{Factor, NotPositive, Symmetric};
 use crate::mesh::{Vec2, Vec3};
+
+use super::anderson::Anderson;
+use super::bending::{Bend, bends};
+use super::pull::Pulls;
 
 /// What the energy weighs; lengths are relative to the mean edge of the patch.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,8 +24,10 @@ pub struct Elastics {
     pub rest_curvature: f64,
     /// Tether to the network's positions: the distance at which it pulls as much as a strain of 1, in mean edges.
     pub tether: f64,
-    /// Rounds of local and global steps.
+    /// Most rounds of local and global steps.
     pub rounds: usize,
+    /// Rounds end when no vertex moves farther than this in one, in mean edges.
+    pub still: f64,
 }
 
 impl Default for Elastics {
@@ -31,12 +37,14 @@ impl Default for Elastics {
             bending: 0.25,
             rest_curvature: 0.25,
             tether: 100.0,
-            rounds: 60,
+            rounds: 300,
+            still: 1e-4,
         }
     }
 }
 
 /// A piece of cloth: rest shape in the plane, the first `free` vertices may move.
+#[derive(Debug, Clone, Copy)]
 pub struct Sheet<'a> {
     /// Rest positions, scene units.
     pub rest: &'a [Vec2],
@@ -46,99 +54,266 @@ pub struct Sheet<'a> {
     pub free: usize,
 }
 
-/// Moves the free vertices of `positions` towards rest lengths and returns the number of rounds done.
-///
-/// # Errors
-/// `NotPositive` when the triangles at rest are degenerate.
-pub fn relax(
-    sheet: &Sheet,
-    positions: &mut [Vec3],
-    elastics: &Elastics,
-) -> Result<usize, NotPositive> {
-    if sheet.free == 0 {
-        return Ok(0);
-    }
-    let triangles: Vec<Triangle> = (sheet.faces.iter())
-        .map(|f| Triangle::at_rest(f, sheet.rest))
-        .collect();
-    let edge = mean_edge(&triangles);
-    let mut bends = bending_rows(sheet, &triangles, positions, elastics);
-    (bends.iter_mut()).for_each(|row| row.weight *= (elastics.bending * edge).powi(2));
-    let tethers = tether_rows(
-        sheet,
-        &triangles,
-        positions,
-        (elastics.tether * edge).powi(-2),
-    );
+/// A sheet's energy, its matrix factored: what does not depend on where the sheet lies.
+pub struct Fabric {
+    triangles: Vec<Triangle>,
+    bends: Vec<Bend>,
+    /// A third of the area of the triangles around each free vertex.
+    lumped: Vec<f64>,
+    /// Mean edge length at rest.
+    pub edge: f64,
+    bending: f64,
+    tether: f64,
+    factor: Option<Factor>,
+}
 
-    let mut matrix = Symmetric::zero(sheet.free);
-    let mut constant = vec![[0.0; 3]; sheet.free];
-    for row in bends.iter().chain(&tethers) {
-        row.add_to(&mut matrix, &mut constant, sheet.free, positions);
+/// The constant part of the right-hand side: bends and tethers of one drawing, and what the held vertices contribute.
+type Goal = Vec<[f64; 3]>;
+
+/// Where strain limiting stopped.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rest {
+    /// Rounds of local and global steps.
+    pub rounds: usize,
+    /// Largest move of a vertex in the last round, in mean edges.
+    pub moved: f64,
+}
+
+impl Fabric {
+    /// Assembles and factors the energy of a sheet.
+    ///
+    /// # Errors
+    /// `NotPositive` when the triangles at rest are degenerate.
+    pub fn new(sheet: &Sheet, elastics: &Elastics) -> Result<Fabric, NotPositive> {
+        let triangles: Vec<Triangle> = (sheet.faces.iter())
+            .map(|f| Triangle::at_rest(f, sheet.rest))
+            .collect();
+        let edge = mean_edge(sheet);
+        let areas: Vec<f64> = triangles.iter().map(|t| t.area).collect();
+        let mut bends = bends(sheet, &areas);
+        (bends.iter_mut()).for_each(|row| row.weight *= (elastics.bending * edge).powi(2));
+        let mut lumped = vec![0.0; sheet.free];
+        for triangle in &triangles {
+            for v in triangle.face {
+                if let Some(a) = lumped.get_mut(v as usize) {
+                    *a += triangle.area / 3.0;
+                }
+            }
+        }
+        let mut fabric = Fabric {
+            triangles,
+            bends,
+            lumped,
+            edge,
+            bending: elastics.bending,
+            tether: elastics.tether,
+            factor: None,
+        };
+        if sheet.free > 0 {
+            fabric.factor = Some(fabric.matrix().factor()?);
+        }
+        Ok(fabric)
     }
-    for (face, triangle) in sheet.faces.iter().zip(&triangles) {
-        for c in 0..2 {
-            let terms = (0..3)
-                .map(|k| (face[k] as usize, triangle.gradient[k][c]))
-                .collect();
-            let row = Row {
-                terms,
-                weight: triangle.area,
-                target: Vec3::zeros(),
+
+    /// Whether the factor is that of these weights; the others do not enter it.
+    pub fn fits(&self, elastics: &Elastics) -> bool {
+        self.bending == elastics.bending && self.tether == elastics.tether
+    }
+
+    /// How many vertices, the first ones, may move.
+    pub fn free(&self) -> usize {
+        self.lumped.len()
+    }
+
+    /// Bytes held, about.
+    pub fn bytes(&self) -> usize {
+        let terms: usize = self.bends.iter().map(|row| row.terms.len()).sum();
+        // The factor of such a matrix has some 60 entries a row, with their row numbers.
+        size_of_val(&self.triangles[..])
+            + size_of_val(&self.bends[..])
+            + terms * size_of::<(u32, f64)>()
+            + self.free() * (60 * 12 + 8)
+    }
+
+    /// The normal equations of all terms.
+    fn matrix(&self) -> Symmetric {
+        let free = self.free();
+        let mut matrix = Symmetric::zero(free);
+        let mut row = Vec::with_capacity(32);
+        for bend in &self.bends {
+            row.clear();
+            row.extend(
+                (bend.terms.iter())
+                    .filter_map(|(v, c)| ((*v as usize) < free).then_some((*v as usize, *c))),
+            );
+            matrix.add_square(&row, bend.weight);
+        }
+        for triangle in &self.triangles {
+            for a in 0..3 {
+                for b in 0..=a {
+                    let (i, j) = (triangle.face[a] as usize, triangle.face[b] as usize);
+                    if i < free && j < free {
+                        matrix.add(
+                            i,
+                            j,
+                            triangle.area * triangle.gradient[a].dot(&triangle.gradient[b]),
+                        );
+                    }
+                }
+            }
+        }
+        let tether = self.tether_weight();
+        (0..free).for_each(|v| matrix.add(v, v, tether * self.lumped[v]));
+        matrix
+    }
+
+    fn tether_weight(&self) -> f64 {
+        (self.tether * self.edge).powi(-2)
+    }
+
+    /// What the drawing `positions` asks for: its own place by the tether, a share of its bends, at free and at held vertices; and the held
+    /// vertices' part of all terms.
+    fn goal(&self, positions: &[Vec3], [at_free, at_held]: [f64; 2]) -> Goal {
+        let free = self.free();
+        let tether = self.tether_weight();
+        let mut goal: Goal = (self.lumped.iter().zip(positions))
+            .map(|(area, p)| (p * (tether * area)).into())
+            .collect();
+        let mut add = |v: u32, force: Vec3| {
+            if let Some(g) = goal.get_mut(v as usize) {
+                (0..3).for_each(|d| g[d] += force[d]);
+            }
+        };
+        for bend in &self.bends {
+            let sum = |own: fn(usize, usize) -> bool| -> Vec3 {
+                (bend.terms.iter())
+                    .filter(|(v, _)| own(*v as usize, free))
+                    .map(|(v, c)| positions[*v as usize] * *c)
+                    .sum()
             };
-            row.add_to(&mut matrix, &mut constant, sheet.free, positions);
+            let held = sum(|v, free| v >= free);
+            let share = if (bend.vertex as usize) < free {
+                at_free
+            } else {
+                at_held
+            };
+            let target = (held + sum(|v, free| v < free)) * share;
+            for (v, c) in &bend.terms {
+                add(*v, (target - held) * (bend.weight * c));
+            }
+        }
+        for triangle in &self.triangles {
+            for a in 0..3 {
+                for b in (0..3).filter(|b| triangle.face[*b] as usize >= free) {
+                    let weight = triangle.area * triangle.gradient[a].dot(&triangle.gradient[b]);
+                    add(
+                        triangle.face[a],
+                        positions[triangle.face[b] as usize] * -weight,
+                    );
+                }
+            }
+        }
+        goal
+    }
+
+    /// Moves the free vertices of `positions`, which hold a drawing, towards rest lengths.
+    ///
+    /// # Errors
+    /// `NotPositive` when a step is not finite.
+    pub fn relax(&self, positions: &mut [Vec3], elastics: &Elastics) -> Result<Rest, NotPositive> {
+        let drawn = Drawn {
+            goal: self.goal(positions, [elastics.rest_curvature, 0.0]),
+            stretches: None,
+        };
+        self.settle(&drawn, positions, elastics, &Pulls::none())
+    }
+
+    /// Cloth that is at rest where it lies now: bends and strains as they are cost nothing, so that pulls to where it lies move nothing.
+    pub fn at_rest(&self, positions: &[Vec3]) -> Drawn {
+        let stretches = self.triangles.iter().map(|t| t.stretch(positions));
+        Drawn {
+            goal: self.goal(positions, [1.0, 1.0]),
+            stretches: Some(stretches.collect()),
         }
     }
-    let factor = matrix.factor()?;
-    for _ in 0..elastics.rounds {
-        let mut rhs = constant.clone();
-        for (face, triangle) in sheet.faces.iter().zip(&triangles) {
-            let pull = triangle.within(face, positions, elastics.strain) * triangle.area;
-            for (v, gradient) in face.iter().zip(&triangle.gradient) {
+
+    /// Moves the free vertices of `positions` to where pulls and a drawing agree.
+    ///
+    /// # Errors
+    /// `NotPositive` when a step is not finite.
+    pub fn settle(
+        &self,
+        drawn: &Drawn,
+        positions: &mut [Vec3],
+        elastics: &Elastics,
+        pulls: &Pulls,
+    ) -> Result<Rest, NotPositive> {
+        let mut rest = Rest {
+            rounds: 0,
+            moved: 0.0,
+        };
+        let Some(factor) = &self.factor else {
+            return Ok(rest);
+        };
+        let mut ahead = Anderson::new(3 * self.free());
+        let mut step = drawn.goal.clone();
+        while rest.rounds < elastics.rounds {
+            step.copy_from_slice(&drawn.goal);
+            self.add_strain(&mut step, positions, (drawn, elastics.strain));
+            factor.solve(&mut step)?;
+            pulls.correct(&mut step);
+            rest.rounds += 1;
+            rest.moved = ahead.advance(positions, &step) / self.edge;
+            if rest.moved < elastics.still {
+                break;
+            }
+        }
+        Ok(rest)
+    }
+
+    /// Adds what every triangle asks for: its deformation within the strain limit, or as it was drawn but for a turn.
+    fn add_strain(&self, rhs: &mut [[f64; 3]], positions: &[Vec3], (drawn, strain): (&Drawn, f64)) {
+        for (k, triangle) in self.triangles.iter().enumerate() {
+            let [a, b, c] = triangle.face.map(|v| v as usize);
+            if a.min(b).min(c) >= rhs.len() {
+                continue;
+            }
+            let own = drawn.stretches.as_ref().map(|all| &all[k]);
+            let wanted = match own {
+                Some(stretch) => triangle.turned(positions, stretch),
+                None => triangle.within(positions, strain),
+            };
+            let pull = wanted * triangle.area;
+            for (v, gradient) in triangle.face.iter().zip(&triangle.gradient) {
                 if let Some(force) = rhs.get_mut(*v as usize) {
                     let along = pull * gradient;
                     (0..3).for_each(|d| force[d] += along[d]);
                 }
             }
         }
-        factor.solve(&mut rhs)?;
-        for (p, x) in positions.iter_mut().zip(&rhs) {
-            *p = Vec3::from(*x);
-        }
     }
-    Ok(elastics.rounds)
+
+    /// Solves with the energy's matrix, in place.
+    ///
+    /// # Errors
+    /// `NotPositive` when the solution is not finite.
+    pub fn solve<const K: usize>(&self, rhs: &mut [[f64; K]]) -> Result<(), NotPositive> {
+        self.factor
+            .as_ref()
+            .map_or(Ok(()), |factor| factor.solve(rhs))
+    }
 }
 
-/// One linear term of the energy: weight · ‖Σ cᵥ xᵥ − target‖².
-struct Row {
-    terms: Vec<(usize, f64)>,
-    weight: f64,
-    target: Vec3,
-}
-
-impl Row {
-    /// Adds the term to the normal equations of the free vertices; the others stay where `positions` has them.
-    fn add_to(
-        &self,
-        matrix: &mut Symmetric,
-        rhs: &mut [[f64; 3]],
-        free: usize,
-        positions: &[Vec3],
-    ) {
-        let (moving, held): (Vec<_>, Vec<_>) = self.terms.iter().partition(|(v, _)| *v < free);
-        let goal = held
-            .iter()
-            .fold(self.target, |goal, (v, c)| goal - positions[*v] * *c);
-        matrix.add_square(&moving, self.weight);
-        for (v, c) in moving {
-            (0..3).for_each(|d| rhs[v][d] += self.weight * c * goal[d]);
-        }
-    }
+/// What a drawing asks of its fabric.
+pub struct Drawn {
+    goal: Goal,
+    /// Per triangle the stretch it wants to keep; none where the strain limit decides.
+    stretches: Option<Vec<Matrix2<f64>>>,
 }
 
 /// A triangle at rest.
 struct Triangle {
-    rest: RestTriangle,
+    face: [u32; 3],
     /// Gradients of the three hat functions.
     gradient: [Vec2; 3],
     area: f64,
@@ -148,27 +323,44 @@ impl Triangle {
     fn at_rest(face: &[u32; 3], rest: &[Vec2]) -> Triangle {
         let rest = RestTriangle::from_corners(face.map(|v| rest[v as usize]));
         Triangle {
+            face: *face,
             gradient: rest.gradients(),
             area: rest.area,
-            rest,
         }
     }
 
-    /// The deformation gradient: columns are the images of the chart's axes.
-    fn deformation(&self, face: &[u32; 3], positions: &[Vec3]) -> Matrix3x2<f64> {
-        (0..3)
-            .map(|k| positions[face[k] as usize] * self.gradient[k].transpose())
-            .sum()
+    /// The deformation gradient: its columns are the images of the chart's axes.
+    fn deformation(&self, positions: &[Vec3]) -> Matrix3x2<f64> {
+        let [a, b, c] = self.face.map(|v| positions[v as usize]);
+        let (ab, ac) = (b - a, c - a);
+        // The gradients of the hat functions add up to zero.
+        Matrix3x2::from_columns(&[
+            ab * self.gradient[1].x + ac * self.gradient[2].x,
+            ab * self.gradient[1].y + ac * self.gradient[2].y,
+        ])
     }
 
     /// The deformation gradient with its singular values brought within 1 ± `strain`.
-    fn within(&self, face: &[u32; 3], positions: &[Vec3], strain: f64) -> Matrix3x2<f64> {
-        let f = self.deformation(face, positions);
+    fn within(&self, positions: &[Vec3], strain: f64) -> Matrix3x2<f64> {
+        let f = self.deformation(positions);
         let limited = |square: f64| {
             let s = square.max(1e-12).sqrt();
             s.clamp(1.0 - strain, 1.0 + strain) / s
         };
         f * spectral(f.transpose() * f, limited)
+    }
+
+    /// S of the deformation gradient's polar decomposition F = R S.
+    fn stretch(&self, positions: &[Vec3]) -> Matrix2<f64> {
+        let f = self.deformation(positions);
+        spectral(f.transpose() * f, |square| square.max(0.0).sqrt())
+    }
+
+    /// The deformation R S nearest to the present one, for a given S and any turn R.
+    fn turned(&self, positions: &[Vec3], stretch: &Matrix2<f64>) -> Matrix3x2<f64> {
+        let along = self.deformation(positions) * stretch;
+        let inverse_root = |square: f64| square.max(1e-24).sqrt().recip();
+        along * spectral(along.transpose() * along, inverse_root) * stretch
     }
 }
 
@@ -185,104 +377,12 @@ fn spectral(c: Matrix2<f64>, g: impl Fn(f64) -> f64) -> Matrix2<f64> {
         + Matrix2::identity() * (0.5 * (high + low))
 }
 
-/// Triangles at rest flatter than this (doubled area ÷ longest edge squared) spoil the Laplacians of their corners.
-const FLATTEST: f64 = 1e-3;
-
-/// Discrete Laplacians (cotangent weights at rest, area-normalised) of the vertices whose fan is closed, as rows of weight area.
-///
-/// The cloth's own bends around the hole go on through its rim, because the rim's rows reach over it. Inner rows ask for a share of the
-/// curvature that `positions` has now.
-fn bending_rows(
-    sheet: &Sheet,
-    triangles: &[Triangle],
-    positions: &[Vec3],
-    elastics: &Elastics,
-) -> Vec<Row> {
-    let count = sheet.rest.len();
-    let (mut area, mut angle, mut terms) =
-        (vec![0.0; count], vec![0.0; count], vec![Vec::new(); count]);
-    for (face, triangle) in sheet.faces.iter().zip(triangles) {
-        for k in 0..3 {
-            let (a, b, c) = (
-                face[k] as usize,
-                face[(k + 1) % 3] as usize,
-                face[(k + 2) % 3] as usize,
-            );
-            let half = 0.5 * triangle.rest.cotangent[k];
-            terms[a].extend([(b, half), (a, -half)]);
-            terms[b].extend([(a, half), (b, -half)]);
-            area[a] += triangle.area / 3.0;
-            let (to_b, to_c) = (sheet.rest[b] - sheet.rest[a], sheet.rest[c] - sheet.rest[a]);
-            let longest = to_b.norm_squared().max(to_c.norm_squared());
-            // Where untangling the rim has turned a triangle of the scan over, there is no telling what unbent means.
-            let sound = to_b.perp(&to_c) > FLATTEST * longest;
-            angle[a] += if sound {
-                to_b.perp(&to_c).atan2(to_b.dot(&to_c))
-            } else {
-                f64::NAN
-            };
-        }
-    }
-    let closed = |v: &usize| (angle[*v] - std::f64::consts::TAU).abs() < 1e-6;
-    (0..count)
-        .filter(closed)
-        .map(|v| {
-            let terms: Vec<(usize, f64)> = merged(std::mem::take(&mut terms[v]))
-                .map(|(w, c)| (w, c / area[v]))
-                .collect();
-            let drawn: Vec3 = terms.iter().map(|(w, c)| positions[*w] * *c).sum();
-            let share = if v < sheet.free {
-                elastics.rest_curvature
-            } else {
-                0.0
-            };
-            Row {
-                terms,
-                weight: area[v],
-                target: drawn * share,
-            }
-        })
-        .collect()
-}
-
-/// Weak springs to where the free vertices are now.
-fn tether_rows(sheet: &Sheet, triangles: &[Triangle], positions: &[Vec3], weight: f64) -> Vec<Row> {
-    let mut area = vec![0.0; sheet.free];
-    for (face, triangle) in sheet.faces.iter().zip(triangles) {
-        for v in face {
-            if let Some(a) = area.get_mut(*v as usize) {
-                *a += triangle.area / 3.0;
-            }
-        }
-    }
-    (0..sheet.free)
-        .map(|v| Row {
-            terms: vec![(v, 1.0)],
-            weight: weight * area[v],
-            target: positions[v],
-        })
-        .collect()
-}
-
-/// Terms with their coefficients summed per vertex, in order of vertex.
-fn merged(mut terms: Vec<(usize, f64)>) -> impl Iterator<Item = (usize, f64)> {
-    terms.sort_by_key(|(v, _)| *v);
-    terms.dedup_by(|next, kept| {
-        let same = next.0 == kept.0;
-        if same {
-            kept.1 += next.1;
-        }
-        same
-    });
-    terms.into_iter()
-}
-
 /// Mean edge length at rest.
-fn mean_edge(triangles: &[Triangle]) -> f64 {
-    let edges = triangles
-        .iter()
-        .flat_map(|t| (0..3).map(|k| (t.rest.corners[(k + 1) % 3] - t.rest.corners[k]).norm()));
-    edges.sum::<f64>() / (3 * triangles.len()).max(1) as f64
+fn mean_edge(sheet: &Sheet) -> f64 {
+    let edges = (sheet.faces.iter()).flat_map(|f| {
+        (0..3).map(|k| (sheet.rest[f[(k + 1) % 3] as usize] - sheet.rest[f[k] as usize]).norm())
+    });
+    edges.sum::<f64>() / (3 * sheet.faces.len()).max(1) as f64
 }
 
 #[cfg(test)]
@@ -325,16 +425,13 @@ mod tests {
             rest_curvature: 0.0,
             ..Elastics::default()
         };
-        relax(
-            &Sheet {
-                rest: &rest,
-                faces: &faces,
-                free,
-            },
-            &mut positions,
-            &elastics,
-        )
-        .unwrap();
+        let sheet = Sheet {
+            rest: &rest,
+            faces: &faces,
+            free,
+        };
+        let fabric = Fabric::new(&sheet, &elastics).unwrap();
+        fabric.relax(&mut positions, &elastics).unwrap();
         for face in &faces {
             for k in 0..3 {
                 let (a, b) = (face[k] as usize, face[(k + 1) % 3] as usize);
@@ -349,16 +446,13 @@ mod tests {
         let (rest, faces, free) = lattice(6);
         let mut positions: Vec<Vec3> = rest.iter().map(|p| Vec3::new(p.x, 2.0, p.y)).collect();
         let before = positions.clone();
-        relax(
-            &Sheet {
-                rest: &rest,
-                faces: &faces,
-                free,
-            },
-            &mut positions,
-            &Elastics::default(),
-        )
-        .unwrap();
+        let sheet = Sheet {
+            rest: &rest,
+            faces: &faces,
+            free,
+        };
+        let fabric = Fabric::new(&sheet, &Elastics::default()).unwrap();
+        fabric.relax(&mut positions, &Elastics::default()).unwrap();
         for (p, q) in positions.iter().zip(&before) {
             assert!((p - q).norm() < 1e-9);
         }

@@ -69,6 +69,22 @@ impl Extension {
         })
     }
 
+    /// Solves with the Laplacian of the free vertices, in place: the smallest Dirichlet energy under a load.
+    ///
+    /// # Errors
+    /// `NotPositive` when the result is not finite.
+    pub fn solve<const K: usize>(&self, load: &mut [[f64; K]]) -> Result<(), NotPositive> {
+        self.factor
+            .as_ref()
+            .map_or(Ok(()), |factor| factor.solve(load))
+    }
+
+    /// Bytes held, about.
+    pub fn bytes(&self) -> usize {
+        // The factor of a planar Laplacian has some 20 entries a row, with their row numbers.
+        size_of_val(&self.role[..]) + size_of_val(&self.pulls[..]) + self.free * (20 * 12 + 8)
+    }
+
     /// Extends one row of values per held vertex to all vertices.
     ///
     /// # Errors

@@ -1,19 +1,22 @@
 //! A patch together with the triangles of the scan that touch its rim, which are held: what strain limiting works on.
 
-use super::PatchError;
-use super::cloth::{Elastics, Sheet, relax};
 use super::triangulate::Triangulation;
 use crate::flatten::Chart;
 use crate::mesh::region::Region;
 use crate::mesh::{Vec2, Vec3};
 
+use super::cloth::Sheet;
+
 /// A patch sewn to the scan's edge. Vertices in order: the patch's inner ones, its rim, the scan's around it.
-pub struct Hem {
+#[derive(Debug, Clone)]
+pub(super) struct Hem {
     rest: Vec<Vec2>,
     faces: Vec<[u32; 3]>,
     free: usize,
     /// Positions of the rim and of the scan's vertices around it.
     held: Vec<Vec3>,
+    /// Vertices of the rim.
+    corners: usize,
 }
 
 impl Hem {
@@ -21,13 +24,7 @@ impl Hem {
     pub fn around(rim: &[u32], tiled: &Triangulation, region: &Region, chart: &Chart) -> Hem {
         let corners = rim.len();
         let free = tiled.points.len() - corners;
-        let place = |v: u32| {
-            if (v as usize) < corners {
-                v + free as u32
-            } else {
-                v - corners as u32
-            }
-        };
+        let place = |v: u32| place(v, corners, free);
         let mut rest = tiled.points[corners..].to_vec();
         rest.extend_from_slice(&tiled.points[..corners]);
         let mut faces: Vec<[u32; 3]> = tiled.faces.iter().map(|f| f.map(place)).collect();
@@ -56,28 +53,40 @@ impl Hem {
             faces,
             free,
             held,
+            corners,
         }
     }
 
-    /// Relaxes the inner vertices from where they are drawn; also the rounds that took.
-    ///
-    /// # Errors
-    /// `Singular` when triangles degenerate.
-    pub fn relax(
-        &self,
-        inner: Vec<Vec3>,
-        elastics: &Elastics,
-    ) -> Result<(Vec<Vec3>, usize), PatchError> {
-        let mut positions = inner;
-        positions.extend_from_slice(&self.held);
-        let sheet = Sheet {
+    /// The cloth in its rest shape.
+    pub fn sheet(&self) -> Sheet<'_> {
+        Sheet {
             rest: &self.rest,
             faces: &self.faces,
             free: self.free,
-        };
-        let rounds = relax(&sheet, &mut positions, elastics)
-            .map_err(|_| PatchError::Singular { stage: "strain" })?;
-        positions.truncate(self.free);
-        Ok((positions, rounds))
+        }
+    }
+
+    /// Where a vertex of the patch (its rim first) comes in the hem.
+    pub fn place(&self, patch_vertex: u32) -> u32 {
+        place(patch_vertex, self.corners, self.free)
+    }
+
+    /// Positions of all vertices, given the inner ones'.
+    pub fn with_inner(&self, mut inner: Vec<Vec3>) -> Vec<Vec3> {
+        inner.extend_from_slice(&self.held);
+        inner
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.rest[..]) + size_of_val(&self.faces[..]) + size_of_val(&self.held[..])
+    }
+}
+
+fn place(v: u32, corners: usize, free: usize) -> u32 {
+    if (v as usize) < corners {
+        v + free as u32
+    } else {
+        v - corners as u32
     }
 }

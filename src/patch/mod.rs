@@ -1,24 +1,32 @@
 //! From a filled grid to triangles on the hole's own rim: triangulation, seam, strain limiting, attributes, and what came of it in numbers.
-//! Stages: `triangulate` → grid positions → `harmonic` (seam) → `cloth` (strain) → `quality`; `attributes` carries texture and colour over.
+//! Stages: `triangulate` → grid positions → `harmonic` (seam) → `cloth` (strain, with `pull`s) → `contacts` → `quality`; `plan` has them in
+//! order, split into what a hole needs once and what each fill needs; `attributes` carries texture and colour over.
 //! No glTF here (the scan's numbers come in as columns) and no network: a patch is made from whatever grid it is given.
 
+mod anderson;
 pub mod attributes;
+mod bending;
 mod cloth;
+mod contacts;
+mod crossings;
 mod harmonic;
 mod hem;
+mod plan;
+mod pull;
 pub mod quality;
+#[cfg(test)]
+mod tests;
 mod triangulate;
 mod untangle;
 
 pub use cloth::Elastics;
+pub use plan::{Plan, plan};
+pub use pull::{Hold, Pull};
 pub use triangulate::signed_area;
 
 use crate::flatten::Chart;
-use crate::grid;
 use crate::mesh::region::Region;
 use crate::mesh::{Vec2, Vec3};
-use hem::Hem;
-use triangulate::Triangulation;
 
 /// Why a hole could not be patched.
 #[derive(Debug, thiserror::Error, PartialEq)]
@@ -65,37 +73,47 @@ pub struct Patch {
     pub faces: Vec<[u32; 3]>,
     /// Rounds of strain limiting.
     pub strain_rounds: usize,
+    /// Pairs of triangles that crossed after strain limiting and were pushed apart.
+    pub collisions: usize,
 }
 
 impl Patch {
-    /// The position at a point of the plane: barycentric in the triangle there, or the nearest vertex's beside the patch.
+    /// The position at a point of the plane: barycentric in the triangle there, or the nearest vertex's beside the patch. O(faces).
     pub fn at(&self, p: Vec2) -> Vec3 {
-        for face in &self.faces {
-            let [a, b, c] = face.map(|v| self.flat[v as usize]);
-            let area = (b - a).perp(&(c - a));
-            let (wa, wb) = ((b - p).perp(&(c - p)) / area, (c - p).perp(&(a - p)) / area);
-            let weights = [wa, wb, 1.0 - wa - wb];
-            if weights.iter().all(|w| *w >= -1e-9) {
-                return face
-                    .iter()
-                    .zip(weights)
-                    .map(|(v, w)| self.positions[*v as usize] * w)
-                    .sum();
-            }
+        if let Some((face, weights)) = locate(&self.flat, &self.faces, p) {
+            let corners = self.faces[face].iter().zip(weights);
+            return corners.map(|(v, w)| self.positions[*v as usize] * w).sum();
         }
         let nearest = (0..self.flat.len()).min_by(|a, b| {
-            (self.flat[*a] - p)
-                .norm()
-                .total_cmp(&(self.flat[*b] - p).norm())
+            let away = |v: &usize| (self.flat[*v] - p).norm_squared();
+            away(a).total_cmp(&away(b))
         });
         nearest.map_or_else(Vec3::zeros, |v| self.positions[v])
     }
 }
 
-/// Meshes the hole of a region with the positions of a filled grid.
+/// The first face that holds a point of the plane, and the point's barycentric weights in it. O(faces), with a box test for most.
+fn locate(flat: &[Vec2], faces: &[[u32; 3]], p: Vec2) -> Option<(usize, [f64; 3])> {
+    faces.iter().enumerate().find_map(|(k, face)| {
+        let [a, b, c] = face.map(|v| flat[v as usize]);
+        let slack = 1e-9 * ((b - a).amax() + (c - a).amax());
+        let beside = |p: f64, corners: [f64; 3]| {
+            corners.iter().all(|x| *x > p + slack) || corners.iter().all(|x| *x < p - slack)
+        };
+        if beside(p.x, [a.x, b.x, c.x]) || beside(p.y, [a.y, b.y, c.y]) {
+            return None;
+        }
+        let area = (b - a).perp(&(c - a));
+        let (wa, wb) = ((b - p).perp(&(c - p)) / area, (c - p).perp(&(a - p)) / area);
+        let weights = [wa, wb, 1.0 - wa - wb];
+        weights.iter().all(|w| *w >= -1e-9).then_some((k, weights))
+    })
+}
+
+/// Meshes the hole of a region with the positions of a filled grid: [`plan`] and [`Plan::patch`] in one, without pulls.
 ///
 /// `filled` holds one scene position per cell. Inner vertices are read off it (bicubic), the difference between grid and scan along the
-/// rim is spread harmonically, then the chart's lengths are restored with the rim held.
+/// rim is spread harmonically, then the chart's lengths are restored with the rim held, and what crosses is pushed apart.
 ///
 /// # Errors
 /// `RimCrosses` when the chart overlaps itself at the hole, `Singular` when triangles degenerate.
@@ -105,74 +123,5 @@ pub fn build(
     filled: &[Vec3],
     options: &Options,
 ) -> Result<Patch, PatchError> {
-    // The rim runs with the cloth on its left, so with the hole on its right: turned round it encloses the patch.
-    let rim: Vec<u32> = region.rim.iter().rev().copied().collect();
-    let polygon: Vec<Vec2> = rim.iter().map(|v| chart.flat[*v as usize]).collect();
-    let polygon = untangle::untangled(&polygon).ok_or(PatchError::RimCrosses)?;
-    let mut tiled =
-        triangulate::triangulate(&polygon, median_edge(region, chart), options.most_vertices)?;
-    let edges = region
-        .mesh
-        .faces
-        .iter()
-        .flat_map(|f| (0..3).map(|k| (f[k].min(f[(k + 1) % 3]), f[k].max(f[(k + 1) % 3]))));
-    let edges: std::collections::HashSet<(u32, u32)> = edges.collect();
-    tiled.split_chords(rim.len(), |a, b| {
-        let (a, b) = (rim[a as usize], rim[b as usize]);
-        edges.contains(&(a.min(b), a.max(b)))
-    });
-
-    let own: Vec<Vec3> = (rim.iter())
-        .map(|v| region.mesh.positions[*v as usize])
-        .collect();
-    let drawn = drawing(&tiled, chart, filled, &own)?;
-    let hem = Hem::around(&rim, &tiled, region, chart);
-    let (inner, strain_rounds) = hem.relax(drawn, &options.elastics)?;
-    Ok(Patch {
-        rim,
-        flat: tiled.points,
-        positions: own.into_iter().chain(inner).collect(),
-        faces: tiled.faces,
-        strain_rounds,
-    })
-}
-
-/// The inner points read off the filled grid, shifted so that the seam is closed: the differences at the rim are spread harmonically.
-fn drawing(
-    tiled: &Triangulation,
-    chart: &Chart,
-    filled: &[Vec3],
-    own: &[Vec3],
-) -> Result<Vec<Vec3>, PatchError> {
-    let drawn: Vec<Vec3> = (tiled.points.iter())
-        .map(|p| grid::evaluate(filled, chart.frame.uv(*p)))
-        .collect();
-    let gaps: Vec<[f64; 3]> = (own.iter().zip(&drawn))
-        .map(|(own, drawn)| (own - drawn).into())
-        .collect();
-    let held: Vec<u32> = (0..own.len() as u32).collect();
-    let spread = harmonic::Extension::new(&tiled.points, &tiled.faces, &held)
-        .and_then(|e| e.extend(&gaps))
-        .map_err(|_| PatchError::Singular { stage: "seam" })?;
-    let closed = drawn.iter().zip(&spread).map(|(p, d)| p + Vec3::from(*d));
-    Ok(closed.skip(own.len()).collect())
-}
-
-/// Median edge length of the region in the plane: the scan's own resolution.
-fn median_edge(region: &Region, chart: &Chart) -> f64 {
-    let edge = |f: &[u32; 3], k: usize| {
-        (chart.flat[f[k] as usize] - chart.flat[f[(k + 1) % 3] as usize]).norm()
-    };
-    let mut edges: Vec<f64> = region
-        .mesh
-        .faces
-        .iter()
-        .flat_map(|f| (0..3).map(move |k| edge(f, k)))
-        .collect();
-    let middle = edges.len() / 2;
-    if edges.is_empty() {
-        1.0
-    } else {
-        *edges.select_nth_unstable_by(middle, f64::total_cmp).1
-    }
+    plan(region, chart, options)?.patch(chart, filled, &[], options)
 }

@@ -1,8 +1,9 @@
 //! What a patch is worth, in numbers that the report carries.
 
 use super::Patch;
+use super::crossings::crossings;
+use crate::mesh::TriMesh;
 use crate::mesh::region::Region;
-use crate::mesh::{TriMesh, intersect};
 
 /// Measurements of a patch.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -78,6 +79,5 @@ pub fn joined(patch: &Patch, region: &Region) -> TriMesh {
 
 fn cuts(patch: &Patch, region: &Region) -> usize {
     let mesh = joined(patch, region);
-    let own: Vec<u32> = (region.mesh.faces.len() as u32..mesh.faces.len() as u32).collect();
-    intersect::intersections_with(&mesh, &own).len()
+    crossings(&mesh, region.mesh.faces.len()).len()
 }

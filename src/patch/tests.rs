@@ -1,0 +1,126 @@
+//! Laws of patches as a whole.
+
+use super::*;
+use crate::flatten::{Frame, Limits, flatten};
+use crate::mesh::loops::{LoopKind, boundary_loops};
+use crate::mesh::region;
+use crate::mesh::shapes::sheet;
+use crate::mesh::topology::Topology;
+use crate::mesh::weld::weld;
+
+/// A wavy sheet with a round hole, its chart enlarged by `slack` (1 for none), and a fill that knows nothing.
+///
+/// Without slack the cloth in the hole is taut between the rulings' ends and no pull is within reach.
+fn wavy(slack: f64) -> (Region, Chart, Vec<Vec3>) {
+    let keep = |u: f64, v: f64| (u - 0.5).hypot(v - 0.5) > 0.2;
+    let wave = |u: f64, v: f64| Vec3::new(u, v, 0.06 * (10.0 * u).sin());
+    let mesh = weld(&sheet(36, keep, wave)).mesh;
+    let topology = Topology::new(&mesh);
+    let loops = boundary_loops(&mesh, &topology);
+    let hole = loops.iter().position(|l| l.kind == LoopKind::Hole).unwrap();
+    let region = region::grow(&mesh, &topology, &loops, hole, f64::INFINITY).unwrap();
+    let mut chart = flatten(&region, &Limits::default()).unwrap();
+    chart.flat.iter_mut().for_each(|p| *p *= slack);
+    chart.frame = Frame::tightest(&chart.flat);
+    (region, chart, vec![Vec3::zeros(); crate::grid::CELLS])
+}
+
+/// The patch without pulls, its plan, and the inner vertex farthest from the rim.
+fn unpulled(region: &Region, chart: &Chart, filled: &[Vec3]) -> (Plan, Patch, usize) {
+    let options = Options::default();
+    let plan = plan(region, chart, &options).unwrap();
+    let patch = plan.patch(chart, filled, &[], &options).unwrap();
+    let rim = patch.rim.len();
+    let clear = |v: usize| {
+        let away = (0..rim).map(|r| (patch.flat[r] - patch.flat[v]).norm());
+        away.fold(f64::INFINITY, f64::min)
+    };
+    let middle = (rim..patch.flat.len())
+        .max_by(|a, b| clear(*a).total_cmp(&clear(*b)))
+        .unwrap();
+    (plan, patch, middle)
+}
+
+fn pulled(slack: f64, to: Vec3, hold: Hold) -> (Patch, Patch, Vec3, f64) {
+    let (region, chart, filled) = wavy(slack);
+    let (plan, free, middle) = unpulled(&region, &chart, &filled);
+    let pull = Pull {
+        at: free.flat[middle],
+        to: free.positions[middle] + to,
+        hold,
+    };
+    let patch = plan
+        .patch(&chart, &filled, &[pull], &Options::default())
+        .unwrap();
+    let rim = patch.rim.len();
+    assert_eq!(
+        patch.positions[..rim],
+        free.positions[..rim],
+        "the rim does not move"
+    );
+    let off = (patch.at(pull.at) - pull.to).norm();
+    let stretch = quality::measure(&patch, &region).stretch_max;
+    let usual = quality::measure(&free, &region).stretch_max;
+    assert!(
+        stretch <= (1.05 * usual).max(1.2) + 1e-9,
+        "{stretch} {usual}"
+    );
+    (patch, free, pull.to, off)
+}
+
+#[test]
+fn planned_or_not_the_patch_is_the_same() {
+    let (region, chart, filled) = wavy(1.0);
+    let (plan, patch, _) = unpulled(&region, &chart, &filled);
+    assert_eq!(
+        build(&region, &chart, &filled, &Options::default()).unwrap(),
+        patch
+    );
+    assert_eq!(plan.flat(), patch.flat);
+    assert_eq!(plan.faces(), patch.faces);
+    assert_eq!(plan.rim(), patch.rim);
+    assert!(plan.bytes() > 0);
+}
+
+#[test]
+fn a_pull_within_reach_is_met() {
+    for hold in [Hold::Soft, Hold::Hard] {
+        let (_, _, _, off) = pulled(1.05, Vec3::new(0.0, 0.0, -0.02), hold);
+        // Half a cell of a grid over the whole sheet.
+        assert!(off < 0.5 / 64.0, "{off} {hold:?}");
+    }
+}
+
+#[test]
+fn an_absurd_pull_tears_nothing() {
+    let (patch, _, to, off) = pulled(1.0, Vec3::new(4.0, 1.0, 3.0), Hold::Hard);
+    assert!(off > 4.0);
+    assert!(patch.positions.iter().all(|p| (p - to).norm() > 4.0));
+}
+
+#[test]
+fn a_pull_to_where_the_cloth_is_changes_next_to_nothing() {
+    let (patch, free, _, _) = pulled(1.0, Vec3::zeros(), Hold::Soft);
+    let squares = patch
+        .positions
+        .iter()
+        .zip(&free.positions)
+        .map(|(a, b)| (a - b).norm_squared());
+    assert!((squares.sum::<f64>() / patch.positions.len() as f64).sqrt() < 0.1 / 64.0);
+}
+
+#[test]
+fn a_pull_beside_the_hole_does_nothing() {
+    let (region, chart, filled) = wavy(1.0);
+    let (plan, free, _) = unpulled(&region, &chart, &filled);
+    let pull = Pull {
+        at: chart.frame.point(Vec2::new(0.02, 0.02)),
+        to: Vec3::zeros(),
+        hold: Hold::Hard,
+    };
+    assert_eq!(
+        plan.patch(&chart, &filled, &[pull], &Options::default())
+            .unwrap(),
+        free
+    );
+}
