@@ -6,7 +6,7 @@ mod json;
 mod validate;
 
 pub use json::{JsonError, from_json};
-pub use validate::{Anchor, Constraints, FieldError, HoleSelector};
+pub use validate::{Anchor, Constraints, Edit, FieldError, Gesture, HoleSelector, Search};
 
 /// The messages and the gRPC service of `proto/darn/v1/darn.proto`, as generated.
 #[allow(missing_docs, clippy::all, clippy::pedantic, rustdoc::all)]

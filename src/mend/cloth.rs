@@ -43,6 +43,14 @@ impl Cloth {
         }
     }
 
+    /// Bytes of memory it holds, about.
+    pub fn bytes(&self) -> usize {
+        let mesh = &self.welded.mesh;
+        let loops: usize = self.loops.iter().map(|l| 8 * l.vertices.len()).sum();
+        // A position and the topology's entry for a vertex; corners, twins and origin for a face.
+        (24 + 8) * mesh.positions.len() + (12 + 16 + 4) * mesh.faces.len() + loops
+    }
+
     /// The scan's part that a welded face belongs to, and its corners there.
     pub fn source(&self, scan: &Scan, face: u32) -> Option<(usize, [u32; 3])> {
         let own = *self.welded.face_of.get(face as usize)?;

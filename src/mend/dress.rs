@@ -5,12 +5,14 @@ use std::collections::BTreeMap;
 use serde_json::json;
 
 use super::cloth::Cloth;
-use super::{MendError, Mender, VERSION};
+use super::hole::Made;
+use super::prepared::Prepared;
+use super::{MendError, VERSION};
 use crate::contract::v1;
-use crate::flatten::Chart;
 use crate::mesh::Vec3;
 use crate::mesh::curvature::vertex_normals;
 use crate::mesh::region::Region;
+use crate::net::WeightsCard;
 use crate::patch::attributes::{Columns, dress};
 use crate::patch::{Patch, quality};
 use crate::scan::{Addition, Part, PatchPoint, Scan};
@@ -18,11 +20,11 @@ use crate::scan::{Addition, Part, PatchPoint, Scan};
 /// The patch as a primitive of the part that most of its rim belongs to.
 pub fn addition(
     (scan, cloth): (&Scan, &Cloth),
-    (region, chart): (&Region, &Chart),
-    patch: &Patch,
-    report: &v1::HoleReport,
-    mender: &Mender,
+    prepared: &Prepared,
+    Made { patch, report }: &Made,
+    card: &WeightsCard,
 ) -> Result<Addition, MendError> {
+    let (region, chart) = (&prepared.region, &prepared.chart);
     let sources: Vec<Option<(usize, [u32; 3])>> = region
         .faces
         .iter()
@@ -117,7 +119,7 @@ pub fn addition(
         texcoords: texcoords.collect(),
         colors: colors.collect(),
         name: format!("darn reconstruction of hole {}", report.id),
-        extras: provenance(report, mender),
+        extras: provenance(report, card),
     })
 }
 
@@ -156,15 +158,17 @@ fn normals(patch: &Patch, region: &Region) -> Vec<Vec3> {
 }
 
 /// What `extras.darn` says of a patch: that it is reconstructed, by what, and with which numbers. No timings: same input, same bytes.
-fn provenance(report: &v1::HoleReport, mender: &Mender) -> serde_json::Value {
-    let card = mender.network.card();
-    let patch = report.patch.unwrap_or_default();
+fn provenance(report: &v1::HoleReport, card: &WeightsCard) -> serde_json::Value {
+    let patch = report.patch.clone().unwrap_or_default();
     let chart = report.chart.unwrap_or_default();
     json!({
         "reconstructed": true,
         "hole": report.id,
         "version": VERSION,
         "weights": { "name": card.name, "sha256": card.sha256 },
+        "anchors": report.anchors.len(),
+        "edits": report.edits.len(),
+        "refinement": patch.refinement,
         "chart": { "stretchMean": chart.stretch_mean, "stretchMax": chart.stretch_max },
         "patch": {
             "area": patch.area,

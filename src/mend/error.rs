@@ -13,6 +13,9 @@ pub enum MendError {
     /// Constraints that do not fit this scan.
     #[error("{} constraint(s) do not fit this scan: {}", .0.len(), told(.0))]
     Constraints(Vec<FieldError>),
+    /// Hard anchors that the cloth does not meet.
+    #[error("{} anchor(s) cannot be met: {}", .0.len(), told(.0))]
+    OutOfReach(Vec<FieldError>),
     /// Nothing to fill.
     #[error("the scan has no hole to fill{}", left(.skipped))]
     NoHoles {
@@ -51,6 +54,14 @@ pub enum MendError {
         /// Cells the cloth covers.
         known: usize,
     },
+    /// The hole is so small that no cell of the grid lies in it.
+    #[error(
+        "hole {hole} is so narrow that no cell of the grid lies in it; there is no place to search"
+    )]
+    NoCells {
+        /// Id of the hole's loop.
+        hole: u32,
+    },
     /// The hole could not be meshed.
     #[error("hole {hole}: {source}")]
     Patch {
@@ -65,6 +76,9 @@ pub enum MendError {
     /// The patches could not be written.
     #[error("the patches could not be written: {0}")]
     Scan(#[from] ScanError),
+    /// A picture could not be encoded.
+    #[error("a picture could not be encoded: {0}")]
+    Picture(image::ImageError),
 }
 
 impl MendError {
@@ -72,6 +86,7 @@ impl MendError {
     pub fn code(&self) -> &'static str {
         match self {
             MendError::Constraints(_) => "constraints_do_not_fit",
+            MendError::OutOfReach(_) => "anchor_out_of_reach",
             MendError::NoHoles { .. } => "no_holes",
             MendError::NonManifold { .. } => "non_manifold_rim",
             MendError::Region {
@@ -87,7 +102,8 @@ impl MendError {
             } => "rim_crosses_itself",
             MendError::Patch { .. } => "patch_degenerate",
             MendError::Scan(ScanError::Singular { .. }) => "singular_transform",
-            MendError::Net(_) | MendError::Scan(_) => "internal",
+            MendError::NoCells { .. } => "hole_too_narrow",
+            MendError::Net(_) | MendError::Scan(_) | MendError::Picture(_) => "internal",
         }
     }
 
@@ -99,7 +115,7 @@ impl MendError {
     /// The constraints it is about.
     pub fn fields(&self) -> Vec<FieldError> {
         match self {
-            MendError::Constraints(fields) => fields.clone(),
+            MendError::Constraints(fields) | MendError::OutOfReach(fields) => fields.clone(),
             _ => Vec::new(),
         }
     }

@@ -1,42 +1,72 @@
-//! The whole job as one synchronous function: read scan in, patched bytes and a report out. The only room that knows all stages.
-//! `cloth` finds the loops, `select` matches them to the request, `hole` mends one, `dress` turns its patch into glTF terms.
+//! The whole job as synchronous functions: read scan in, patched bytes and a report out. The only room that knows all stages.
+//! `cloth` finds the loops, `select` matches them to the request, `prepared` lays a hole flat, `wishes` and `fill` bring constraints to it,
+//! `hole` meshes it, `dress` turns its patch into glTF terms; `opened` is all of a scan's holes, kept by `session`, thrown away by [`mend`].
 //! No async, no I/O, no clocks but for the report's timings; the bytes depend on scan, constraints, weights and version alone.
 
 mod cloth;
 mod dress;
 mod error;
+mod fill;
 mod hole;
+mod inpainter;
+mod opened;
+mod picture;
+mod prepared;
+mod search;
 mod select;
+mod session;
+mod wishes;
 
 use std::time::{Duration, Instant};
 
-use crate::contract::{Constraints, v1};
-use crate::net::Network;
-use crate::scan::{Addition, Scan};
-use crate::{flatten, patch};
+use crate::contract::{Anchor, Constraints, Search, v1};
+use crate::net::Networks;
+use crate::scan::Scan;
+use crate::{edit, flatten, patch};
 
 use cloth::Cloth;
 pub use error::MendError;
+pub use fill::Response;
+use opened::Opened;
+pub use session::Session;
 
 /// darn's version, as the report and the patches carry it.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// What mends: one loaded network and how far to go.
+/// What mends: the loaded networks and how far to go.
 #[derive(Debug)]
 pub struct Mender {
-    /// The network that imagines the cloth.
-    pub network: Network,
+    /// The networks that imagine the cloth.
+    pub networks: Networks,
     /// What a mend may cost and look like.
     pub limits: Limits,
 }
 
 /// What a mend may cost and look like.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Limits {
     /// When a chart is refused.
     pub flatten: flatten::Limits,
     /// How a patch is made.
     pub patch: patch::Options,
+    /// How the network is asked for edited cloth.
+    pub response: Response,
+    /// How far an anchor search goes.
+    pub search: edit::Options,
+    /// Cells an anchor search looks at before it sets out.
+    pub seeds: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Limits {
+            flatten: flatten::Limits::default(),
+            patch: patch::Options::default(),
+            response: Response::default(),
+            search: edit::Options::default(),
+            seeds: 8,
+        }
+    }
 }
 
 /// A mended scan.
@@ -64,35 +94,43 @@ impl Mended {
 /// # Errors
 /// When a constraint does not fit the scan, or when a hole asked for cannot be filled, or when there is none.
 pub fn mend(scan: &Scan, constraints: &Constraints, mender: &Mender) -> Result<Mended, MendError> {
-    let started = Instant::now();
-    let cloth = Cloth::of(scan);
-    let selection = select::select(scan, &cloth, constraints)?;
-    let holes_started = Instant::now();
-    let mut additions: Vec<Addition> = Vec::new();
-    let mut holes = Vec::new();
-    for chosen in &selection.chosen {
-        let (addition, report) = hole::mend(scan, &cloth, chosen, mender)?;
-        additions.push(addition);
-        holes.push(report);
-    }
-    let holes_ms = milliseconds(holes_started);
-    let write_started = Instant::now();
-    let bytes = scan.write(&additions)?;
-    let report = v1::Report {
-        version: VERSION.to_owned(),
-        weights: Some(weights(mender)),
-        holes,
-        skipped: selection.skipped,
-        timings: Some(v1::ScanTimings {
-            read: 0.0,
-            holes: holes_ms,
-            write: milliseconds(write_started),
-            total: milliseconds(started),
-            ..cloth.timings
-        }),
-        notes: cloth.notes(scan),
+    Opened::new(scan, constraints, mender)?.mended(scan, constraints, mender)
+}
+
+/// Searches where on a hole's grid a point in space belongs: the cell where an anchor at that point is best followed by the cloth.
+///
+/// # Errors
+/// When the hole is not there, cannot be laid flat, or is not named among several.
+pub fn optimize_anchor(
+    scan: &Scan,
+    search: &Search,
+    mender: &Mender,
+) -> Result<v1::AnchorFound, MendError> {
+    Opened::for_search(scan, search, mender)?.search(search, mender)
+}
+
+/// Searches, and fills all holes with an anchor at the place that was found.
+///
+/// # Errors
+/// As [`optimize_anchor`] and [`mend`].
+pub fn mend_to_target(scan: &Scan, search: &Search, mender: &Mender) -> Result<Mended, MendError> {
+    let opened = Opened::new(scan, &Constraints::default(), mender)?;
+    let found = opened.search(search, mender)?;
+    opened.mended(scan, &anchor_of(&found, search), mender)
+}
+
+/// What a search found, as constraints: a soft anchor at its target.
+pub fn anchor_of(found: &v1::AnchorFound, search: &Search) -> Constraints {
+    let anchor = Anchor {
+        hole: Some(found.hole),
+        uv: <[f64; 2]>::try_from(found.uv.as_slice()).ok(),
+        position: search.target,
+        hard: false,
     };
-    Ok(Mended { bytes, report })
+    Constraints {
+        anchors: vec![anchor],
+        ..Constraints::default()
+    }
 }
 
 /// Every boundary loop of a scan, and what it is.
@@ -117,15 +155,6 @@ pub fn find_holes(scan: &Scan, _limits: &Limits) -> Result<v1::HolesReport, Mend
             ..cloth.timings
         }),
     })
-}
-
-/// The weights a report names.
-fn weights(mender: &Mender) -> v1::Weights {
-    let card = mender.network.card();
-    v1::Weights {
-        name: card.name.clone(),
-        sha256: card.sha256.clone(),
-    }
 }
 
 /// Milliseconds since.

@@ -1,10 +1,10 @@
-//! Which loops a request means, and which anchors belong to which.
+//! Which loops a request means, and which anchors and gestures belong to which.
 
 use std::collections::BTreeMap;
 
 use super::MendError;
 use super::cloth::{Cloth, kind};
-use crate::contract::{Anchor, Constraints, FieldError, HoleSelector, v1};
+use crate::contract::{Anchor, Constraints, Edit, FieldError, HoleSelector, v1};
 use crate::mesh::Vec3;
 use crate::mesh::loops::{BoundaryLoop, LoopKind};
 use crate::mesh::nearest::distance_to_loop;
@@ -19,38 +19,56 @@ pub struct Selection {
 }
 
 /// A loop to fill.
+#[derive(Default)]
 pub struct Chosen {
     /// Its id, which is its place among the cloth's loops.
     pub id: u32,
     /// Its anchors, each with its place in the request.
     pub anchors: Vec<(usize, Anchor)>,
+    /// Its gestures, each with its place in the request.
+    pub edits: Vec<(usize, Edit)>,
+}
+
+impl Chosen {
+    fn loop_of(id: u32) -> Chosen {
+        Chosen {
+            id,
+            ..Chosen::default()
+        }
+    }
 }
 
 /// Matches a request to the loops of a scan.
 ///
 /// # Errors
-/// `NoHoles` when nobody chose and there is none; `Constraints` for every selector or anchor that matches no loop that may be filled; `NonManifold` when an asked-for rim is no closed line.
+/// `NoHoles` when nobody chose and there is none; `Constraints` for every selector, anchor or gesture that matches no loop that may be filled; `NonManifold` when an asked-for rim is no closed line.
 pub fn select(
     scan: &Scan,
     cloth: &Cloth,
     constraints: &Constraints,
 ) -> Result<Selection, MendError> {
     let mut wrong = Vec::new();
-    let mut chosen: BTreeMap<u32, Vec<(usize, Anchor)>> = BTreeMap::new();
+    let mut chosen: BTreeMap<u32, Chosen> = BTreeMap::new();
     if constraints.holes.is_empty() {
         let fillable = (cloth.loops.iter()).filter(|l| reason_to_skip(scan, cloth, l).is_none());
-        chosen.extend(fillable.map(|l| (l.id, Vec::new())));
+        chosen.extend(fillable.map(|l| (l.id, Chosen::loop_of(l.id))));
     }
     for (i, selector) in constraints.holes.iter().enumerate() {
         match find(scan, cloth, selector) {
-            Ok(id) => drop(chosen.entry(id).or_default()),
+            Ok(id) => drop(chosen.entry(id).or_insert_with(|| Chosen::loop_of(id))),
             Err(detail) => wrong.push(FieldError::new(format!("/holes/{i}"), detail)),
         }
     }
     for (i, anchor) in constraints.anchors.iter().enumerate() {
-        match owner(&chosen, anchor) {
-            Ok(id) => chosen.entry(id).or_default().push((i, *anchor)),
+        match owner(&mut chosen, anchor.hole) {
+            Ok(hole) => hole.anchors.push((i, *anchor)),
             Err(detail) => wrong.push(FieldError::new(format!("/anchors/{i}/hole"), detail)),
+        }
+    }
+    for (i, edit) in constraints.edits.iter().enumerate() {
+        match owner(&mut chosen, edit.hole) {
+            Ok(hole) => hole.edits.push((i, *edit)),
+            Err(detail) => wrong.push(FieldError::new(format!("/edits/{i}/hole"), detail)),
         }
     }
     if !wrong.is_empty() {
@@ -70,11 +88,10 @@ pub fn select(
     if chosen.is_empty() {
         return Err(MendError::NoHoles { skipped });
     }
-    let chosen = chosen
-        .into_iter()
-        .map(|(id, anchors)| Chosen { id, anchors })
-        .collect();
-    Ok(Selection { chosen, skipped })
+    Ok(Selection {
+        chosen: chosen.into_values().collect(),
+        skipped,
+    })
 }
 
 fn find(scan: &Scan, cloth: &Cloth, selector: &HoleSelector) -> Result<u32, String> {
@@ -102,14 +119,18 @@ fn find(scan: &Scan, cloth: &Cloth, selector: &HoleSelector) -> Result<u32, Stri
     }
 }
 
-fn owner(chosen: &BTreeMap<u32, Vec<(usize, Anchor)>>, anchor: &Anchor) -> Result<u32, String> {
-    match anchor.hole {
-        Some(id) if chosen.contains_key(&id) => Ok(id),
-        Some(id) => Err(format!("hole {id} is not among the holes to fill")),
-        None if chosen.len() == 1 => Ok(chosen.keys().copied().next().unwrap_or_default()),
+/// The hole that an anchor or gesture belongs to: the one it names, or the only one.
+fn owner(chosen: &mut BTreeMap<u32, Chosen>, named: Option<u32>) -> Result<&mut Chosen, String> {
+    let count = chosen.len();
+    match named {
+        Some(id) => {
+            (chosen.get_mut(&id)).ok_or_else(|| format!("hole {id} is not among the holes to fill"))
+        }
+        None if count == 1 => {
+            (chosen.values_mut().next()).ok_or_else(|| "there is no hole to fill".to_owned())
+        }
         None => Err(format!(
-            "{} holes are to be filled; say which one the anchor belongs to",
-            chosen.len()
+            "{count} holes are to be filled; say which one it belongs to"
         )),
     }
 }

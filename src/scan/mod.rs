@@ -156,6 +156,21 @@ impl Scan {
         self.layout.container
     }
 
+    /// Bytes of memory it holds, about.
+    pub fn bytes_held(&self) -> usize {
+        let attributes = |part: &Part| {
+            let texcoords: usize = part.texcoords.iter().map(|set| 8 * set.len()).sum();
+            let colors: usize = part.colors.iter().map(|set| 16 * set.len()).sum();
+            texcoords + colors + part.normals.as_ref().map_or(0, |set| 12 * set.len())
+        };
+        let parts: usize = self.parts.iter().map(attributes).sum();
+        let surface = 24 * self.surface.positions.len() + 12 * self.surface.faces.len();
+        let local: usize = self.blocks.iter().map(|b| 12 * b.local.len()).sum();
+        // Between a data URI, which is as long as its text, and lists of small numbers, which take ten times theirs.
+        let json = 4 * self.layout.json.len();
+        self.bytes.len() + json + surface + local + parts
+    }
+
     /// The part that a face of `surface` belongs to.
     pub fn part_of_face(&self, face: u32) -> Option<usize> {
         let at = self.parts.partition_point(|part| part.faces.end <= face);

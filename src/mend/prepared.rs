@@ -1,0 +1,354 @@
+//! What of a hole does not depend on constraints: region, chart, grid, plan of the patch; and its cloth as it is without any.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use super::cloth::Cloth;
+use super::inpainter::{Inpainter, Voice};
+use super::{Limits, MendError, milliseconds};
+use crate::contract::v1;
+use crate::edit::{HoleCells, Reach};
+use crate::flatten::{self, Chart};
+use crate::grid::{self, CELLS, Grid, NormalGrid, Normalisation};
+use crate::mesh::region::{self, Region};
+use crate::mesh::{Vec2, Vec3};
+use crate::patch::{self, Patch, PatchError, Plan};
+
+/// How much of the grid's side the hole should take, so that hole and context share it as in training.
+const SHARE: f64 = 0.5;
+/// A region is grown again when its reach is off by more than this factor.
+const OFF: f64 = 1.3;
+/// Reach of each further try, when a region gives no usable chart.
+const SMALLER: f64 = 0.6;
+/// Reach of the collar that the extent of a hole is first read off, as a share of what suits a round one.
+const COLLAR: f64 = 0.2;
+/// Tries with smaller and smaller regions.
+const TRIES: usize = 4;
+/// Unedited fills that are kept, one for each network and up direction; a session rarely asks for a second.
+const VOICES: usize = 4;
+
+/// A hole ready to be filled.
+pub struct Prepared {
+    /// The loop's id.
+    pub id: u32,
+    /// The cloth around it.
+    pub region: Region,
+    /// The same laid flat.
+    pub chart: Chart,
+    /// How it will be meshed.
+    pub plan: Plan,
+    /// What the grid knows of the scan.
+    pub grid: Grid,
+    /// Brings the grid to the network's units and back.
+    pub normal: Normalisation,
+    /// The grid's cells that are in the hole.
+    pub cells: HoleCells,
+    /// What holds the cloth in it.
+    pub reach: Reach,
+    /// The grid in numbers.
+    pub report: v1::GridReport,
+    /// Milliseconds of preparing it.
+    pub timings: v1::HoleTimings,
+    polygon: Vec<Vec2>,
+    unedited: Mutex<Vec<(Voice, Arc<Unedited>)>>,
+}
+
+/// A hole's cloth without constraints.
+pub struct Unedited {
+    /// The network's answer for every cell, scene space.
+    pub predicted: Vec<Vec3>,
+    /// The scan's positions where they are known, the network's elsewhere.
+    pub filled: Vec<Vec3>,
+    /// The patch made of it.
+    pub patch: Patch,
+    /// Milliseconds of the network.
+    pub net_ms: f64,
+    /// Milliseconds of meshing.
+    pub patch_ms: f64,
+}
+
+impl Prepared {
+    /// Prepares a hole; with smaller and smaller regions when one gives no usable chart.
+    pub fn new(cloth: &Cloth, id: u32, limits: &Limits) -> Result<Prepared, MendError> {
+        let mut reach = reach_for(extent_at_a_glance(cloth, id));
+        let mut tries = 0;
+        loop {
+            let outcome =
+                Laid::out(cloth, id, reach, limits).and_then(|laid| laid.sampled(id, limits));
+            tries += 1;
+            match outcome {
+                Err(error) if tries < TRIES && may_shrink(&error) => reach *= SMALLER,
+                outcome => return outcome,
+            }
+        }
+    }
+
+    /// The grid as the network takes it, without anchors.
+    pub fn normal_grid(&self) -> NormalGrid {
+        self.grid.normalised(&self.normal)
+    }
+
+    /// Whether a uv lies in the hole.
+    pub fn holds(&self, uv: Vec2) -> bool {
+        inside(&self.polygon, uv)
+    }
+
+    /// Larger side of the hole's box in the chart, scene units.
+    pub fn extent(&self) -> f64 {
+        extent(&self.polygon) * self.chart.frame.side
+    }
+
+    /// Scene units per cell.
+    pub fn cell(&self) -> f64 {
+        self.normal.scale / grid::SIDE as f64
+    }
+
+    /// The hole's cloth without constraints; made when it is first asked for.
+    pub fn unedited(
+        &self,
+        inpainter: &Inpainter,
+        limits: &Limits,
+    ) -> Result<Arc<Unedited>, MendError> {
+        // Nothing that is done under the lock can panic half-way.
+        let lock = || self.unedited.lock().unwrap_or_else(PoisonError::into_inner);
+        let kept = lock()
+            .iter()
+            .find(|(voice, _)| voice == inpainter.voice())
+            .map(|(_, u)| Arc::clone(u));
+        if let Some(kept) = kept {
+            return Ok(kept);
+        }
+        let made = Arc::new(self.fill(inpainter, limits)?);
+        let mut all = lock();
+        if all.len() >= VOICES {
+            all.remove(0);
+        }
+        all.push((inpainter.voice().clone(), Arc::clone(&made)));
+        Ok(made)
+    }
+
+    fn fill(&self, inpainter: &Inpainter, limits: &Limits) -> Result<Unedited, MendError> {
+        let started = Instant::now();
+        let answers = inpainter.fill(std::slice::from_ref(&self.normal_grid()))?;
+        let predicted = self.in_scene(answers.first().map_or(&[], Vec::as_slice));
+        let net_ms = milliseconds(started);
+        let started = Instant::now();
+        let filled = self.filled(&predicted);
+        let patch = self.patch(&filled, &[], limits)?;
+        Ok(Unedited {
+            predicted,
+            filled,
+            patch,
+            net_ms,
+            patch_ms: milliseconds(started),
+        })
+    }
+
+    /// A network's answer in scene space; all cells.
+    pub fn in_scene(&self, answer: &[[f32; 3]]) -> Vec<Vec3> {
+        let mut positions: Vec<Vec3> = answer.iter().map(|q| self.normal.to_scene(q)).collect();
+        positions.resize(CELLS, self.normal.centre);
+        positions
+    }
+
+    /// The scan's positions where they are known, `imagined` ones elsewhere.
+    pub fn filled(&self, imagined: &[Vec3]) -> Vec<Vec3> {
+        let each = self.grid.positions.iter().zip(&self.grid.known);
+        each.zip(imagined)
+            .map(|((own, known), new)| if *known { *own } else { *new })
+            .collect()
+    }
+
+    /// Meshes a filled grid.
+    pub fn patch(
+        &self,
+        filled: &[Vec3],
+        pulls: &[patch::Pull],
+        limits: &Limits,
+    ) -> Result<Patch, MendError> {
+        self.plan
+            .patch(&self.chart, filled, pulls, &limits.patch)
+            .map_err(|source| MendError::Patch {
+                hole: self.id,
+                source,
+            })
+    }
+
+    /// Bytes of memory it holds, about.
+    pub fn bytes(&self) -> usize {
+        let mesh = |m: &crate::mesh::TriMesh| 24 * m.positions.len() + 12 * m.faces.len();
+        let region = mesh(&self.region.mesh)
+            + 4 * (self.region.vertices.len() + self.region.faces.len())
+            + 16 * self.chart.flat.len();
+        // Known flag, position, place among the hole's cells.
+        let grid = CELLS * (24 + 1 + 9);
+        let lock = self.unedited.lock().unwrap_or_else(PoisonError::into_inner);
+        let each = |u: &Arc<Unedited>| {
+            2 * 24 * CELLS + 40 * u.patch.positions.len() + 12 * u.patch.faces.len()
+        };
+        region + grid + self.plan.bytes() + lock.iter().map(|(_, u)| each(u)).sum::<usize>()
+    }
+}
+
+/// Cloth around a hole, laid flat.
+struct Laid {
+    region: Region,
+    chart: Chart,
+    timings: v1::HoleTimings,
+}
+
+impl Laid {
+    /// Grows and flattens the region; once more when the chart shows that the reach did not suit the hole.
+    fn out(cloth: &Cloth, hole: u32, reach: f64, limits: &Limits) -> Result<Laid, MendError> {
+        let laid = Self::with_reach(cloth, hole, reach, limits)?;
+        let wanted = reach_for(extent(&laid.rim_uv()) * laid.chart.frame.side);
+        // Only outwards if the region stopped because it was asked to, not because the cloth ended or wraps around.
+        let off = wanted < reach / OFF || (wanted > reach * OFF && laid.region.reach >= reach);
+        if !off {
+            return Ok(laid);
+        }
+        let mut again = match Self::with_reach(cloth, hole, wanted, limits) {
+            Ok(again) => again,
+            Err(_) => return Ok(laid),
+        };
+        again.timings.region += laid.timings.region;
+        again.timings.flatten += laid.timings.flatten;
+        Ok(again)
+    }
+
+    fn with_reach(
+        cloth: &Cloth,
+        hole: u32,
+        reach: f64,
+        limits: &Limits,
+    ) -> Result<Laid, MendError> {
+        let started = Instant::now();
+        let region = region::grow(
+            &cloth.welded.mesh,
+            &cloth.topology,
+            &cloth.loops,
+            hole as usize,
+            reach,
+        )
+        .map_err(|source| MendError::Region { hole, source })?;
+        let grown = milliseconds(started);
+        let started = Instant::now();
+        let chart = flatten::flatten(&region, &limits.flatten)
+            .map_err(|source| MendError::Flatten { hole, source })?;
+        let timings = v1::HoleTimings {
+            region: grown,
+            flatten: milliseconds(started),
+            ..Default::default()
+        };
+        Ok(Laid {
+            region,
+            chart,
+            timings,
+        })
+    }
+
+    /// The rim as a polygon in uv.
+    fn rim_uv(&self) -> Vec<Vec2> {
+        let uv = |v: &u32| self.chart.uv(*v);
+        self.region.rim.iter().map(uv).collect()
+    }
+
+    /// Samples the grid and plans the patch.
+    fn sampled(self, id: u32, limits: &Limits) -> Result<Prepared, MendError> {
+        let started = Instant::now();
+        let grid = flatten::raster(&self.region.mesh, &self.chart);
+        let normal = grid.normalisation().ok_or(MendError::TooLittleKnown {
+            hole: id,
+            known: grid.known_count(),
+        })?;
+        let polygon = self.rim_uv();
+        let report = grid_report(&grid, &normal, &polygon);
+        let cells = HoleCells::new(|k| !grid.known[k] && inside(&polygon, grid::cell_centre(k)));
+        let raster = milliseconds(started);
+
+        let started = Instant::now();
+        let plan = patch::plan(&self.region, &self.chart, &limits.patch)
+            .map_err(|source| MendError::Patch { hole: id, source })?;
+        let timings = v1::HoleTimings {
+            raster,
+            patch: milliseconds(started),
+            ..self.timings
+        };
+        let Laid { region, chart, .. } = self;
+        let rim = region.rim.iter().map(|v| {
+            let at = *v as usize;
+            (chart.flat[at], region.mesh.positions[at])
+        });
+        let reach = Reach::new(rim);
+        Ok(Prepared {
+            id,
+            plan,
+            grid,
+            normal,
+            cells,
+            reach,
+            report,
+            timings,
+            polygon,
+            unedited: Mutex::default(),
+            region,
+            chart,
+        })
+    }
+}
+
+fn grid_report(grid: &Grid, normal: &Normalisation, polygon: &[Vec2]) -> v1::GridReport {
+    let spacing = grid::spacing(&grid.positions, |a, b| grid.known[a] && grid.known[b]);
+    v1::GridReport {
+        spacing_mean: normal.scale / grid::SIDE as f64,
+        spacing_variance: spacing.variance / (spacing.mean * spacing.mean),
+        known: grid.known_count() as f64 / CELLS as f64,
+        hole: patch::signed_area(polygon).abs(),
+    }
+}
+
+/// Larger side of a polygon's box.
+fn extent(polygon: &[Vec2]) -> f64 {
+    let low = polygon.iter().fold(Vec2::repeat(f64::MAX), |m, p| m.inf(p));
+    let high = polygon.iter().fold(Vec2::repeat(f64::MIN), |m, p| m.sup(p));
+    (high - low).max()
+}
+
+/// Reach of a region around a hole of this extent.
+fn reach_for(extent: f64) -> f64 {
+    0.5 * extent * (1.0 / SHARE - 1.0)
+}
+
+/// Larger side of the hole's box in a chart of a narrow collar around it; where that cannot be laid flat, that of a round hole.
+fn extent_at_a_glance(cloth: &Cloth, id: u32) -> f64 {
+    let round = cloth.loops[id as usize].length / std::f64::consts::PI;
+    let collar = region::grow(
+        &cloth.welded.mesh,
+        &cloth.topology,
+        &cloth.loops,
+        id as usize,
+        COLLAR * reach_for(round),
+    );
+    match collar.map(|collar| flatten::hole_extent(&collar)) {
+        Ok(Ok(extent)) => extent,
+        _ => round,
+    }
+}
+
+/// Whether a smaller region may do better.
+fn may_shrink(error: &MendError) -> bool {
+    match error {
+        MendError::Flatten { .. } => true,
+        MendError::Patch { source, .. } => *source == PatchError::RimCrosses,
+        _ => false,
+    }
+}
+
+/// Whether a point lies in a polygon (even–odd rule).
+fn inside(polygon: &[Vec2], p: Vec2) -> bool {
+    let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
+    let crossed = edges.filter(|(a, b)| {
+        (a.y <= p.y) != (b.y <= p.y) && a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x) > p.x
+    });
+    crossed.count() % 2 == 1
+}
