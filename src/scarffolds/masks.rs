@@ -46,6 +46,11 @@ type Place = [f32; 2];
 
 /// Draws a mask of one hole, sometimes two.
 pub fn draw(rng: &mut impl Rng) -> Vec<bool> {
+    draw_kind(rng).1
+}
+
+/// [`draw`], and the shape of the first hole.
+pub fn draw_kind(rng: &mut impl Rng) -> (Shape, Vec<bool>) {
     let mut at = rng.random_range(0.0..1.0f32);
     let mut shape = Shape::Blob;
     for (candidate, share) in SHAPES {
@@ -57,9 +62,9 @@ pub fn draw(rng: &mut impl Rng) -> Vec<bool> {
     }
     let first = draw_shape(shape, rng);
     if rng.random_bool(0.88) {
-        return first;
+        return (shape, first);
     }
-    beside(first, rng)
+    (shape, beside(first, rng))
 }
 
 /// Draws a mask of one hole of the given shape, somewhere near the middle.

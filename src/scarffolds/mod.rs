@@ -4,6 +4,7 @@
 
 pub mod cloth;
 pub mod collide;
+pub mod export;
 mod field;
 mod files;
 pub mod masks;
@@ -11,3 +12,4 @@ pub mod samples;
 pub mod scanned;
 pub mod scene;
 pub mod sheets;
+mod spline;

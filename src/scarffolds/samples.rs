@@ -3,9 +3,9 @@
 //! A sample looks like what `flatten` and `Grid` hand to the network: the hole takes a third to two thirds of the grid, cloth ends where
 //! the sheet ends or at some distance from the hole, the mean of the known cells is 0 and the mean spacing of known neighbours is 1/64.
 
-use super::cloth::{SIDE as SHEET, VERTICES};
-use super::masks;
+use super::masks::{self, Shape};
 use super::sheets::Sheet;
+use super::spline::Spline;
 use crate::grid::{CELLS, SIDE};
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 use rand::Rng;
@@ -73,13 +73,19 @@ impl Sampler {
 
     /// Draws a sample from sheet number `sheet`: for held-out sets in which every sheet has its turn.
     pub fn sample_of(&self, sheet: usize, rng: &mut impl Rng) -> Sample {
+        let (_, mut sample) = self.clean_sample_of(sheet, rng);
+        if rng.random_bool(NOISY.0) {
+            add_noise(&mut sample.truth, &sample.known, rng);
+        }
+        sample
+    }
+
+    /// [`Sampler::sample_of`] without noise, and the shape of its hole: for measuring.
+    pub fn clean_sample_of(&self, sheet: usize, rng: &mut impl Rng) -> (Shape, Sample) {
         let spline = &self.splines[sheet];
         let banded = rng.random_bool(BANDED);
-        let hole = if banded {
-            centred(&masks::draw(rng), rng)
-        } else {
-            masks::draw(rng)
-        };
+        let (shape, hole) = masks::draw_kind(rng);
+        let hole = if banded { centred(&hole, rng) } else { hole };
         let away = masks::distance(&hole);
         let square = Square::around(&away, rng);
         let reach = if banded {
@@ -101,103 +107,15 @@ impl Sampler {
                 }
             })
             .collect();
-        let mut truth = normalised(&positions, &valid, &known, &turn(self.turning, rng));
-        if rng.random_bool(NOISY.0) {
-            add_noise(&mut truth, &known, rng);
-        }
-        Sample {
+        let truth = normalised(&positions, &valid, &known, &turn(self.turning, rng));
+        let sample = Sample {
             truth,
             valid,
             known,
             hole,
-        }
+        };
+        (shape, sample)
     }
-}
-
-/// Natural bicubic spline through a sheet's vertices, as B-spline coefficients with one more on every side.
-#[derive(Debug, Clone)]
-pub(super) struct Spline {
-    coefficients: Vec<Vector3<f32>>,
-}
-
-const PADDED: usize = SHEET + 2;
-
-impl Spline {
-    pub(super) fn new(sheet: &Sheet) -> Self {
-        assert_eq!(
-            sheet.positions.len(),
-            VERTICES,
-            "a sheet has 51 × 51 vertices"
-        );
-        let mut rows: Vec<Vec<Vector3<f32>>> = sheet
-            .positions
-            .chunks_exact(SHEET)
-            .map(|row| {
-                line_coefficients(&row.iter().map(|p| Vector3::from(*p)).collect::<Vec<_>>())
-            })
-            .collect();
-        let mut coefficients = vec![Vector3::zeros(); PADDED * PADDED];
-        for i in 0..PADDED {
-            let column: Vec<_> = rows.iter_mut().map(|row| row[i]).collect();
-            for (j, c) in line_coefficients(&column).into_iter().enumerate() {
-                coefficients[j * PADDED + i] = c;
-            }
-        }
-        Self { coefficients }
-    }
-
-    /// The sheet's position at a place in [0, 1]².
-    pub(super) fn at(&self, [u, v]: [f32; 2]) -> Vector3<f32> {
-        let (i, wu) = basis(u);
-        let (j, wv) = basis(v);
-        let mut sum = Vector3::zeros();
-        for (row, wv) in wv.iter().enumerate() {
-            let start = (j + row) * PADDED + i;
-            for (c, wu) in self.coefficients[start..start + 4].iter().zip(&wu) {
-                sum += c * (wu * wv);
-            }
-        }
-        sum
-    }
-}
-
-/// First coefficient and the four cubic B-spline weights at a coordinate in [0, 1].
-fn basis(x: f32) -> (usize, [f32; 4]) {
-    let x = x.clamp(0.0, 1.0) * (SHEET - 1) as f32;
-    let cell = (x as usize).min(SHEET - 2);
-    let t = x - cell as f32;
-    let s = 1.0 - t;
-    let (t2, t3) = (t * t, t * t * t);
-    let sixth = 1.0 / 6.0;
-    (
-        cell,
-        [
-            s * s * s * sixth,
-            (3.0 * t3 - 6.0 * t2 + 4.0) * sixth,
-            (-3.0 * t3 + 3.0 * t2 + 3.0 * t + 1.0) * sixth,
-            t3 * sixth,
-        ],
-    )
-}
-
-/// B-spline coefficients of the natural cubic spline through `values`: (c₋ + 4c + c₊)/6 = value, straight at the ends.
-fn line_coefficients(values: &[Vector3<f32>]) -> Vec<Vector3<f32>> {
-    let n = values.len();
-    let mut c = vec![Vector3::zeros(); n + 2];
-    let mut ratio = vec![0.0f32; n];
-    c[1] = values[0];
-    for k in 1..n - 1 {
-        let pivot = 4.0 - ratio[k - 1];
-        ratio[k] = 1.0 / pivot;
-        c[k + 1] = (values[k] * 6.0 - c[k]) * ratio[k];
-    }
-    c[n] = values[n - 1];
-    for k in (1..n - 1).rev() {
-        c[k + 1] = c[k + 1] - c[k + 2] * ratio[k];
-    }
-    c[0] = c[1] * 2.0 - c[2];
-    c[n + 1] = c[n] * 2.0 - c[n - 1];
-    c
 }
 
 /// The grid's square on the sheet: place = middle + across · (i, j), a similarity, sometimes mirrored.
@@ -246,8 +164,8 @@ fn on_sheet([u, v]: [f32; 2]) -> bool {
     (0.0..=1.0).contains(&u) && (0.0..=1.0).contains(&v)
 }
 
-/// First and last column and row of the mask.
-fn bounds(mask: &[bool]) -> [[usize; 2]; 2] {
+/// First and last column, and first and last row, of the mask; `[64, 0]` twice when it is empty.
+pub fn bounds(mask: &[bool]) -> [[usize; 2]; 2] {
     let mut found = [[SIDE, 0]; 2];
     for k in (0..CELLS).filter(|&k| mask[k]) {
         for (range, at) in found.iter_mut().zip([k % SIDE, k / SIDE]) {
@@ -375,82 +293,5 @@ fn add_noise(truth: &mut [[f32; 3]], known: &[bool], rng: &mut impl Rng) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-
-    /// A sheet rolled on a cylinder of the given radius: isometric to the flat one.
-    fn rolled(radius: f32) -> Sheet {
-        let step = 1.0 / (SHEET - 1) as f32;
-        let positions = (0..VERTICES)
-            .map(|k| {
-                let (u, v) = ((k % SHEET) as f32 * step, (k / SHEET) as f32 * step);
-                [radius * (u / radius).sin(), v, radius * (u / radius).cos()]
-            })
-            .collect();
-        Sheet { positions }
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(48))]
-
-        #[test]
-        fn a_sample_is_in_the_networks_units(seed: u64, radius in 0.15f32..2.0) {
-            let sampler = Sampler::new(&[rolled(radius)], Turning::Any);
-            let sample = sampler.sample(&mut ChaCha8Rng::seed_from_u64(seed));
-            let known: Vec<usize> = (0..CELLS).filter(|&k| sample.known[k]).collect();
-            prop_assert!(known.len() > 150, "{} known cells", known.len());
-            for axis in 0..3 {
-                let mean: f32 = known.iter().map(|&k| sample.truth[k][axis]).sum::<f32>() / known.len() as f32;
-                prop_assert!(mean.abs() < 1e-3);
-            }
-            for k in 0..CELLS {
-                prop_assert!(!sample.hole[k] || (sample.valid[k] && !sample.known[k]));
-                prop_assert!(!sample.known[k] || sample.valid[k]);
-                if k % SIDE + 1 < SIDE && sample.hole[k] && sample.hole[k + 1] {
-                    let [a, b] = [k, k + 1].map(|k| Vector3::from(sample.truth[k]));
-                    // holes carry no noise; a chord is shorter than its arc by less than 1 % here
-                    prop_assert!(((a - b).norm() * 64.0 - 1.0).abs() < 0.03, "{}", (a - b).norm() * 64.0);
-                }
-            }
-        }
-
-        #[test]
-        fn every_rim_lies_on_the_sheet(seed: u64) {
-            let sampler = Sampler::new(&[rolled(1.0)], Turning::Any);
-            let sample = sampler.sample(&mut ChaCha8Rng::seed_from_u64(seed));
-            let away = masks::distance(&sample.hole);
-            for k in (0..CELLS).filter(|&k| away[k] > 0.0 && away[k] < 1.5) {
-                prop_assert!(sample.known[k]);
-            }
-        }
-    }
-
-    #[test]
-    fn the_spline_goes_through_the_vertices() {
-        let sheet = rolled(0.3);
-        let spline = Spline::new(&sheet);
-        for (k, p) in sheet.positions.iter().enumerate() {
-            let place = [k % SHEET, k / SHEET].map(|i| i as f32 / (SHEET - 1) as f32);
-            assert!((spline.at(place) - Vector3::from(*p)).norm() < 2e-5);
-        }
-    }
-
-    #[test]
-    fn upright_samples_keep_their_height_order() {
-        let sheet = rolled(0.4);
-        let sampler = Sampler::new(&[sheet], Turning::Upright);
-        let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let q = turn(sampler.turning, &mut rng);
-        assert!((q * Vector3::z() - Vector3::z()).norm() < 1e-6);
-    }
-
-    #[test]
-    fn the_same_seed_draws_the_same_sample() {
-        let sampler = Sampler::new(&[rolled(0.5), rolled(0.2)], Turning::Any);
-        let draw = || sampler.sample(&mut ChaCha8Rng::seed_from_u64(11));
-        assert_eq!(draw(), draw());
-    }
-}
+#[path = "samples_tests.rs"]
+mod tests;

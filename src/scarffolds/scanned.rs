@@ -4,8 +4,8 @@
 use rand::Rng;
 use spade::{DelaunayTriangulation, Point2, Triangulation as _};
 
-use super::samples::Spline;
 use super::sheets::Sheet;
+use super::spline::Spline;
 use crate::mesh::{TriMesh, Vec2, Vec3};
 
 /// The shape of a hole on the unit square.

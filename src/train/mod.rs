@@ -4,7 +4,9 @@
 
 pub mod batch;
 pub mod checkpoint;
+pub mod curves;
 pub mod loss;
+mod near;
 pub mod optimiser;
 pub mod score;
 pub mod trainer;
@@ -25,7 +27,7 @@ use crate::scarffolds;
 use crate::scarffolds::samples::{Sampler, Turning};
 
 pub use crate::scarffolds::samples::Sample;
-pub use loss::LossWeights;
+pub use loss::{LossKind, LossWeights};
 pub use score::Score;
 pub use trainer::{Progress, Sources, Summary};
 

@@ -14,7 +14,7 @@ use super::score::score;
 use super::*;
 use crate::grid::{CELLS, SIDE, cell_centre, cell_index};
 use crate::net::weights::export;
-use crate::net::{InputKind, Network};
+use crate::net::{BackendKind, InputKind, Network};
 
 type B = Autodiff<Flex>;
 
@@ -95,6 +95,7 @@ fn the_loss_is_what_one_computes_by_hand() {
         &LossWeights {
             gradient: 2.0,
             stretch: 3.0,
+            ..LossWeights::default()
         },
     );
     let number = |x: Tensor<Flex, 1>| f64::from(x.into_scalar());
@@ -200,11 +201,8 @@ fn training_learns_resumes_and_ships_what_loads() {
     let summary =
         trainer::train::<B>(&options, sources(), &mut |p| losses.push(p.loss[0])).unwrap();
     assert!(summary.steps > 0 && summary.weights.exists());
-    let network = Network::load(
-        &std::fs::read(&summary.weights).unwrap(),
-        Default::default(),
-    )
-    .unwrap();
+    let network =
+        Network::load(&std::fs::read(&summary.weights).unwrap(), BackendKind::Flex).unwrap();
     let training = &network.card().training;
     assert_eq!(
         (training.steps, training.data_seed),

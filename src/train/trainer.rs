@@ -1,9 +1,7 @@
 //! The training loop: warm-up and cosine over a budget of minutes, averaged weights, scores and checkpoints on the way.
 
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions};
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -15,6 +13,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::batch::{Ahead, Batch, Prepared, Recipe, prepare};
 use super::checkpoint::{self, State, replace};
+use super::curves::Curves;
 use super::loss::{Loss, Target, loss};
 use super::optimiser::{AdamW, average};
 use super::score::{Score, score};
@@ -47,8 +46,8 @@ pub struct Progress {
     pub minutes: f64,
     /// Share of the budget used, 0 to 1.
     pub share: f64,
-    /// The loss, and its terms: data, gradient, stretch.
-    pub loss: [f32; 4],
+    /// The loss, and its terms: data, gradient, stretch, self-penetration.
+    pub loss: [f32; 5],
     /// Norm of the whole gradient.
     pub norm: f64,
     /// The newest scores, at the steps that measured them: the network's, and the input fill's on the same samples.
@@ -206,7 +205,7 @@ fn rate(highest: f64, share: f64, step: u64) -> f64 {
 }
 
 /// One step; returns the loss with its terms, and the gradient's norm.
-fn step<B>(state: &mut State<B>, batch: Batch, options: &TrainOptions, rate: f64) -> ([f32; 4], f64)
+fn step<B>(state: &mut State<B>, batch: Batch, options: &TrainOptions, rate: f64) -> ([f32; 5], f64)
 where
     B: AutodiffBackend<InnerBackend: Convolve> + Convolve,
 {
@@ -231,8 +230,9 @@ where
         data,
         gradient,
         stretch,
+        self_penetration,
     } = loss(predicted, &target, &options.loss);
-    let terms = [&total, &data, &gradient, &stretch].map(number);
+    let terms = [&total, &data, &gradient, &stretch, &self_penetration].map(number);
     let gradients = GradientsParams::from_grads(total.backward(), &state.network);
     let (network, norm) = state
         .optimiser
@@ -321,8 +321,11 @@ fn write_weights<B: AutodiffBackend>(
             minutes: state.seconds / 60.0,
             data_seed,
             loss: format!(
-                "data + {} gradient + {} stretch",
-                options.loss.gradient, options.loss.stretch
+                "{:?} data + {} gradient + {} stretch + {} self-penetration",
+                options.loss.kind,
+                options.loss.gradient,
+                options.loss.stretch,
+                options.loss.self_penetration
             ),
         },
         scores: named_scores(scored, fill),
@@ -358,80 +361,4 @@ fn named_scores(scored: &Score, fill: &Score) -> BTreeMap<String, f64> {
         .into_iter()
         .chain(named("fill_", fill))
         .collect()
-}
-
-/// The CSV curves of a run.
-struct Curves {
-    steps: File,
-    scores: File,
-    dir: PathBuf,
-}
-
-impl Curves {
-    fn open(dir: &Path, start: Start) -> Result<Curves, TrainError> {
-        let open = |name: &str, header: &str| {
-            let path = dir.join(name);
-            let mut options = OpenOptions::new();
-            let append = start == Start::Resume;
-            options
-                .create(true)
-                .write(true)
-                .append(append)
-                .truncate(!append);
-            let opened = options.open(&path).and_then(|mut file| {
-                if file.metadata()?.len() == 0 {
-                    writeln!(file, "{header}")?;
-                }
-                Ok(file)
-            });
-            opened.map_err(|source| TrainError::File { path, source })
-        };
-        let score = "rmse,rmse_median,normal,spacing,area";
-        let fill = score
-            .split(',')
-            .map(|name| format!("fill_{name}"))
-            .collect::<Vec<_>>()
-            .join(",");
-        Ok(Curves {
-            steps: open(
-                "loss.csv",
-                "step,minutes,rate,loss,data,gradient,stretch,norm",
-            )?,
-            scores: open("scores.csv", &format!("step,minutes,{score},{fill}"))?,
-            dir: dir.to_owned(),
-        })
-    }
-
-    fn step(&mut self, p: &Progress, rate: f64) -> Result<(), TrainError> {
-        let [total, data, gradient, stretch] = p.loss;
-        let line = writeln!(
-            self.steps,
-            "{},{:.3},{rate:.3e},{total:.4},{data:.4},{gradient:.4},{stretch:.4},{:.3}",
-            p.step, p.minutes, p.norm
-        );
-        line.map_err(|source| TrainError::File {
-            path: self.dir.join("loss.csv"),
-            source,
-        })
-    }
-
-    fn scores(&mut self, p: &Progress) -> Result<(), TrainError> {
-        let values = p
-            .scores
-            .iter()
-            .flatten()
-            .flat_map(|s| [s.rmse, s.rmse_median, s.normal, s.spacing, s.area]);
-        let values: Vec<String> = values.map(|v| format!("{v:.4}")).collect();
-        let line = writeln!(
-            self.scores,
-            "{},{:.3},{}",
-            p.step,
-            p.minutes,
-            values.join(",")
-        );
-        line.map_err(|source| TrainError::File {
-            path: self.dir.join("scores.csv"),
-            source,
-        })
-    }
 }
