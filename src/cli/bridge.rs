@@ -1,58 +1,115 @@
 //! What the service is given to mend with: reads the scan, mends it, and sorts refusals by whose fault they are.
 
-use darn::contract::{Constraints, v1};
-use darn::mend::{self, MendError, Mender};
+use darn::contract::{Constraints, Search, v1};
+use darn::mend::{self, MendError, Mender, Session};
 use darn::scan::{Limits, Scan, ScanError};
-use darn::serve::{Class, Mended, Menders, Refusal};
+use darn::serve::{Class, Kept, Mended, Menders, PatchForm, Patches, Refusal};
 use std::error::Error;
-use std::time::Instant;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 /// The scan of the warm-up mend: small, and whole and real.
 const EXAMPLE: &[u8] = include_bytes!("../../examples/scarf_hole.glb");
 
 /// A mender behind the service's seam.
 pub struct Bridge {
-    /// What mends.
-    pub mender: Mender,
+    /// What mends; sessions share it.
+    pub mender: Arc<Mender>,
     /// What a scan may cost.
     pub limits: Limits,
 }
 
 impl Bridge {
-    fn scan(&self, bytes: &[u8]) -> Result<Scan, Refusal> {
-        Scan::read(bytes, &self.limits).map_err(|error| of_scan(&error))
+    /// A scan, and how long reading it took.
+    fn scan(&self, bytes: &[u8]) -> Result<(Scan, Duration), Refusal> {
+        let started = Instant::now();
+        let scan = Scan::read(bytes, &self.limits).map_err(|error| of_scan(&error))?;
+        Ok((scan, started.elapsed()))
     }
 }
 
 impl Menders for Bridge {
     fn inpaint(&self, scan: &[u8], constraints: &Constraints) -> Result<Mended, Refusal> {
-        let started = Instant::now();
-        let scan = self.scan(scan)?;
-        let read = started.elapsed();
-        let mended = mend::mend(&scan, constraints, &self.mender)
-            .map_err(|error| of_mend(&error))?
-            .with_read_time(read);
-        Ok(Mended {
-            bytes: mended.bytes,
-            report: mended.report,
-        })
+        let (scan, read) = self.scan(scan)?;
+        let mended = mend::mend(&scan, constraints, &self.mender);
+        mended
+            .map(|m| passed(m.with_read_time(read)))
+            .map_err(of_mend)
+    }
+
+    fn optimize_anchor(&self, scan: &[u8], search: &Search) -> Result<v1::AnchorFound, Refusal> {
+        let (scan, _) = self.scan(scan)?;
+        mend::optimize_anchor(&scan, search, &self.mender).map_err(of_mend)
+    }
+
+    fn mend_to_target(&self, scan: &[u8], search: &Search) -> Result<Mended, Refusal> {
+        let (scan, read) = self.scan(scan)?;
+        let mended = mend::mend_to_target(&scan, search, &self.mender);
+        mended
+            .map(|m| passed(m.with_read_time(read)))
+            .map_err(of_mend)
+    }
+
+    fn open(&self, scan: &[u8], constraints: &Constraints) -> Result<Box<dyn Kept>, Refusal> {
+        let (scan, _) = self.scan(scan)?;
+        let session = Session::open(scan, constraints, Arc::clone(&self.mender));
+        Ok(Box::new(Held(session.map_err(of_mend)?)))
     }
 
     fn find_holes(&self, scan: &[u8]) -> Result<v1::HolesReport, Refusal> {
-        let started = Instant::now();
-        let scan = self.scan(scan)?;
-        let read = started.elapsed().as_secs_f64() * 1e3;
-        let mut found =
-            mend::find_holes(&scan, &self.mender.limits).map_err(|error| of_mend(&error))?;
+        let (scan, read) = self.scan(scan)?;
+        let mut found = mend::find_holes(&scan, &self.mender.limits).map_err(of_mend)?;
         if let Some(timings) = &mut found.timings {
-            timings.read = read;
-            timings.total += read;
+            timings.read = read.as_secs_f64() * 1e3;
+            timings.total += timings.read;
         }
         Ok(found)
     }
 
     fn warm_up(&self) -> Result<(), Refusal> {
         self.inpaint(EXAMPLE, &Constraints::default()).map(drop)
+    }
+}
+
+/// A session behind the service's seam.
+struct Held(Session);
+
+impl Kept for Held {
+    fn described(&self) -> v1::Session {
+        self.0.described()
+    }
+
+    fn bytes(&self) -> usize {
+        self.0.bytes()
+    }
+
+    fn patches(&self, constraints: &Constraints, form: PatchForm) -> Result<Patches, Refusal> {
+        let (bytes, report) = match form {
+            PatchForm::Glb => self.0.glb(constraints).map_err(of_mend)?,
+            PatchForm::Positions => {
+                let (positions, report) = self.0.positions(constraints).map_err(of_mend)?;
+                let numbers = positions.iter().flatten().flat_map(|p| [p.x, p.y, p.z]);
+                let bytes = numbers.flat_map(|x| (x as f32).to_le_bytes());
+                (bytes.collect(), report)
+            }
+        };
+        Ok(Patches { bytes, report })
+    }
+
+    fn mended(&self, constraints: &Constraints) -> Result<Mended, Refusal> {
+        self.0.mended(constraints).map(passed).map_err(of_mend)
+    }
+
+    fn optimize_anchor(&self, search: &Search) -> Result<v1::AnchorFound, Refusal> {
+        self.0.optimize_anchor(search).map_err(of_mend)
+    }
+}
+
+/// A mended scan in the service's words.
+fn passed(mended: mend::Mended) -> Mended {
+    Mended {
+        bytes: mended.bytes,
+        report: mended.report,
     }
 }
 
@@ -78,7 +135,7 @@ fn of_scan(error: &ScanError) -> Refusal {
     }
 }
 
-fn of_mend(error: &MendError) -> Refusal {
+fn of_mend(error: MendError) -> Refusal {
     let class = if error.is_internal() {
         Class::Internal
     } else {
@@ -87,7 +144,7 @@ fn of_mend(error: &MendError) -> Refusal {
     Refusal {
         class,
         code: error.code(),
-        detail: told(error),
+        detail: told(&error),
         fields: error.fields(),
     }
 }

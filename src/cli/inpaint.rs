@@ -5,7 +5,7 @@ use super::files;
 use super::holes::kind;
 use super::network::NetworkArgs;
 use super::progress::Progress;
-use darn::contract::v1::Report;
+use darn::contract::v1::{HoleReport, Report};
 use darn::contract::{self, Constraints, FieldError};
 use darn::scan::{Limits, Scan};
 use std::path::{Path, PathBuf};
@@ -74,7 +74,7 @@ fn constraints(path: &Path) -> Result<Constraints, Failure> {
 fn summary(report: &Report) -> String {
     let mut text = String::new();
     for hole in &report.holes {
-        let patch = hole.patch.unwrap_or_default();
+        let patch = hole.patch.clone().unwrap_or_default();
         let crossings = match patch.self_intersections {
             0 => String::new(),
             n => format!(", {n} self-intersections"),
@@ -83,6 +83,7 @@ fn summary(report: &Report) -> String {
             "hole {}: rim of {} vertices, length {:.4}; patched with {} faces, stretch {:.3}{crossings}\n",
             hole.id, hole.vertices, hole.length, patch.faces, patch.stretch_mean
         ));
+        text.push_str(&kept(hole));
     }
     for left in &report.skipped {
         text.push_str(&format!(
@@ -102,10 +103,25 @@ fn summary(report: &Report) -> String {
     text
 }
 
+/// One line an anchor or gesture: how near the cloth came.
+fn kept(hole: &HoleReport) -> String {
+    let anchors = hole.anchors.iter().map(|a| {
+        let at: Vec<String> = a.uv.iter().map(|x| format!("{x:.3}")).collect();
+        format!("  anchor at {}: {:.4} away\n", at.join(" "), a.distance)
+    });
+    let edits = hole.edits.iter().map(|e| {
+        format!(
+            "  gesture of {} point(s): at most {:.4} away\n",
+            e.anchors, e.distance
+        )
+    });
+    anchors.chain(edits).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use darn::contract::v1::{HoleReport, Skipped};
+    use darn::contract::v1::Skipped;
 
     #[test]
     fn every_loop_has_its_line() {

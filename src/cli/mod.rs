@@ -3,13 +3,16 @@
 //! No geometry, no HTTP routes, no training: a command that grows a second idea wants a room in the library.
 
 mod bridge;
+mod evaluate;
 mod failure;
 mod files;
 mod healthcheck;
 mod holes;
 mod inpaint;
+mod mended;
 mod network;
 mod openapi;
+mod optimize_anchor;
 mod progress;
 mod render;
 mod scarffolds;
@@ -39,6 +42,8 @@ enum Command {
     Serve(ServeArgs),
     /// Fill the holes of a scan
     Inpaint(inpaint::Args),
+    /// Search where on a hole's chart a point in space belongs
+    OptimizeAnchor(optimize_anchor::Args),
     /// List the boundary loops of a scan: its holes, its border, the ends of its sleeves
     Holes(holes::Args),
     /// Draw a shaded picture of a scan; reconstructed cloth is tinted
@@ -49,6 +54,8 @@ enum Command {
     Scarffolds(scarffolds::Args),
     /// Train a network on simulated sheets
     Train(train::Args),
+    /// Measure a network's fills on held-out sheets
+    Evaluate(evaluate::Args),
     /// Print the service's OpenAPI document
     Openapi,
 }
@@ -83,11 +90,13 @@ fn run(command: Command) -> Result<(), Failure> {
     match command {
         Command::Serve(settings) => serve::run(&settings),
         Command::Inpaint(args) => inpaint::run(&args),
+        Command::OptimizeAnchor(args) => optimize_anchor::run(&args),
         Command::Holes(args) => holes::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Healthcheck(args) => healthcheck::run(&args),
         Command::Scarffolds(args) => scarffolds::run(&args),
         Command::Train(args) => train::run(&args),
+        Command::Evaluate(args) => evaluate::run(&args),
         Command::Openapi => openapi::run(),
     }
 }

@@ -1,16 +1,18 @@
-//! The network a command works with: the shipped weights, built into the binary, or a file of one's own.
+//! The networks a command works with: the shipped weights, built into the binary, or files of one's own.
 
 use super::failure::{Failure, OrFail};
 use super::files;
 use darn::mend::{Limits, Mender};
-use darn::net::{BackendKind, Network};
-use darn::serve::Backend;
-use std::borrow::Cow;
+use darn::net::{BackendKind, Network, Networks, Settings};
+use darn::serve::{Autodiff, Backend};
 use std::path::{Path, PathBuf};
 
-/// The weights that are used when none are named.
-const SHIPPED: &[u8] = include_bytes!("../../weights/standard.safetensors");
-/// Their file's name in a directory of weights.
+/// The weights that are used when none are named; the first are the default ones.
+const SHIPPED: [(&str, &[u8]); 1] = [(
+    STANDARD,
+    include_bytes!("../../weights/standard.safetensors"),
+)];
+/// The default weights' file in a directory of weights.
 const STANDARD: &str = "standard.safetensors";
 
 #[derive(Debug, clap::Args)]
@@ -23,44 +25,89 @@ pub struct NetworkArgs {
         long,
         env = "DARN_BACKEND",
         value_name = "NAME",
-        default_value = "flex"
+        default_value = "engine"
     )]
     backend: Backend,
+    /// What differentiates the network in the anchor search: the engine, or burn's autodiff on flex
+    #[arg(
+        long,
+        env = "DARN_AUTODIFF",
+        value_name = "NAME",
+        default_value = "engine"
+    )]
+    autodiff: Autodiff,
 }
 
 impl NetworkArgs {
-    /// Loads the network these settings name.
+    /// Loads the networks these settings name.
     pub fn mender(&self) -> Result<Mender, Failure> {
-        mender(self.weights.as_deref(), self.backend)
+        mender(
+            self.weights.as_deref(),
+            settings(self.backend, self.autodiff)?,
+        )
     }
 }
 
-/// Loads the network from `weights`, a file or a directory with `standard.safetensors` in it, or the shipped one.
-pub fn mender(weights: Option<&Path>, backend: Backend) -> Result<Mender, Failure> {
-    let (bytes, name) = match weights {
-        None => (Cow::Borrowed(SHIPPED), "the shipped weights".to_owned()),
-        Some(path) => {
-            let file = if path.is_dir() {
-                path.join(STANDARD)
-            } else {
-                path.to_owned()
-            };
-            (Cow::Owned(files::read(&file)?), file.display().to_string())
-        }
+/// Loads the networks from `weights`, or the shipped ones.
+///
+/// Of a directory, all files whose name ends in `.safetensors`: `standard.safetensors`, which must be there, is the default.
+pub fn mender(weights: Option<&Path>, settings: Settings) -> Result<Mender, Failure> {
+    let load =
+        |bytes: &[u8], name: &str| Network::load(bytes, settings).or_fail(format!("load {name}"));
+    let networks: Result<Vec<Network>, Failure> = match weights {
+        None => (SHIPPED.iter())
+            .map(|(name, bytes)| load(bytes, &format!("the shipped {name}")))
+            .collect(),
+        Some(path) if path.is_dir() => (in_directory(path)?.iter())
+            .map(|file| load(&files::read(file)?, &file.display().to_string()))
+            .collect(),
+        Some(file) => load(&files::read(file)?, &file.display().to_string()).map(|n| vec![n]),
     };
-    let network = Network::load(&bytes, kind(backend)?).or_fail(format!("load {name}"))?;
+    let mut networks = networks?.into_iter();
+    let default = networks
+        .next()
+        .ok_or_else(|| Failure::Usage("there are no weights".into()))?;
     Ok(Mender {
-        network,
+        networks: Networks::new(default, networks.collect()),
         limits: Limits::default(),
     })
 }
 
-fn kind(backend: Backend) -> Result<BackendKind, Failure> {
+/// The weights in a directory, the default ones first, the others by name.
+fn in_directory(path: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let name = path.display();
+    let entries = std::fs::read_dir(path).or_fail(format!("read {name}"))?;
+    let mut others = Vec::new();
+    for entry in entries {
+        let file = entry.or_fail(format!("read {name}"))?.path();
+        let is_weights = file.extension().is_some_and(|e| e == "safetensors");
+        if is_weights && file.file_name().is_some_and(|n| n != STANDARD) {
+            others.push(file);
+        }
+    }
+    others.sort();
+    others.insert(0, path.join(STANDARD));
+    Ok(others)
+}
+
+/// What runs and what differentiates.
+pub fn settings(backend: Backend, autodiff: Autodiff) -> Result<Settings, Failure> {
     let name = match backend {
+        Backend::Engine => "engine",
         Backend::Flex => "flex",
         Backend::Ndarray => "ndarray",
     };
     // A build without a backend does not know its name.
-    name.parse()
-        .map_err(|error: darn::net::NetError| Failure::Usage(error.to_string()))
+    let backend: BackendKind = name
+        .parse()
+        .map_err(|error: darn::net::NetError| Failure::Usage(error.to_string()))?;
+    let autodiff = match (autodiff, backend) {
+        (Autodiff::Burn, BackendKind::Engine) => Some(BackendKind::Flex),
+        _ => None,
+    };
+    Ok(Settings {
+        backend,
+        autodiff,
+        ..Settings::default()
+    })
 }

@@ -10,10 +10,20 @@ use std::sync::Arc;
 pub fn run(settings: &ServeArgs) -> Result<(), Failure> {
     start_logging(&settings.log, settings.log_format)
         .map_err(|error| Failure::Usage(format!("--log {}: {error}", settings.log)))?;
-    let mender = network::mender(settings.weights.as_deref(), settings.backend)?;
+    let mender = network::mender(
+        settings.weights.as_deref(),
+        network::settings(settings.backend, settings.autodiff)?,
+    )?;
     let limits = Limits {
         max_faces: settings.max_faces,
         ..Limits::default()
     };
-    darn::serve::run(settings, Arc::new(Bridge { mender, limits })).or_fail("serve")
+    darn::serve::run(
+        settings,
+        Arc::new(Bridge {
+            mender: Arc::new(mender),
+            limits,
+        }),
+    )
+    .or_fail("serve")
 }

@@ -2,7 +2,7 @@
 
 use super::failure::{Failure, OrFail};
 use darn::net::UnetConfig;
-use darn::train::{Progress, Score, Start, TrainOptions};
+use darn::train::{LossWeights, Progress, Score, Start, TrainOptions};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -41,6 +41,9 @@ pub struct Args {
     /// Minutes between checkpoints, scores and exported weights
     #[arg(long, default_value_t = TrainOptions::default().every)]
     every: f64,
+    /// What counts as an error
+    #[arg(long, value_enum, default_value = "standard")]
+    loss: Loss,
     /// Seed of weights and samples
     #[arg(long, default_value_t = TrainOptions::default().seed)]
     seed: u64,
@@ -53,6 +56,27 @@ pub struct Args {
     /// Start from the weights in this file instead of random ones
     #[arg(long, conflicts_with = "resume")]
     from: Option<PathBuf>,
+}
+
+/// The losses there are weights for.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Loss {
+    /// Softened positions and differences, lengths
+    Standard,
+    /// The same, and cloth repels cloth
+    Interpen,
+    /// As in the paper: squared positions and differences, a small repulsion
+    Paper,
+}
+
+impl Loss {
+    fn weights(self) -> LossWeights {
+        match self {
+            Self::Standard => LossWeights::default(),
+            Self::Interpen => LossWeights::interpen(),
+            Self::Paper => LossWeights::paper(),
+        }
+    }
 }
 
 pub fn run(args: &Args) -> Result<(), Failure> {
@@ -88,13 +112,13 @@ impl Args {
                 width: self.width,
                 ..UnetConfig::default()
             },
+            loss: self.loss.weights(),
             batch: self.batch,
             rate: self.rate,
             minutes: self.minutes,
             every: self.every,
             seed: self.seed,
             sample_threads: self.sample_threads,
-            ..TrainOptions::default()
         }
     }
 }
@@ -121,7 +145,7 @@ impl Told {
     }
 
     fn step(&mut self, now: &Progress) {
-        let [total, data, gradient, stretch] = now.loss;
+        let [total, data, gradient, stretch, self_penetration] = now.loss;
         if let Some(bar) = &self.bar {
             bar.set_position((now.share * BAR as f64) as u64);
             bar.set_message(format!("step {} loss {total:.4}", now.step));
@@ -134,6 +158,7 @@ impl Told {
                 data,
                 gradient,
                 stretch,
+                self_penetration,
                 norm = now.norm,
                 "training"
             );

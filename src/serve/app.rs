@@ -11,15 +11,18 @@ use std::{
 
 use tokio::{
     sync::{OwnedSemaphorePermit, Semaphore},
-    time::Instant,
+    time::{Instant, timeout_at},
 };
 use tracing::error;
+use uuid::Uuid;
 
 use super::{
     config::ServeArgs,
-    errors::{Class, Menders, Refusal},
     pool::{Pool, PoolError},
     problem::Fault,
+    seam::{Class, Menders, Refusal},
+    session::Session,
+    sessions::{SessionLimits, Sessions},
     telemetry::Metrics,
 };
 
@@ -31,6 +34,8 @@ pub struct App {
     pub limits: Limits,
     /// Web pages that may call, by origin; `*` for any.
     pub allow_origin: Vec<String>,
+    /// Scans kept for editing.
+    pub sessions: Arc<Sessions>,
     pool: Pool,
     /// Bodies that may still be received at once.
     uploads: Arc<Semaphore>,
@@ -39,12 +44,27 @@ pub struct App {
     draining: AtomicBool,
 }
 
-/// The right to receive a body and to be put into the queue with it; free again when dropped.
+/// The right to receive a body, if there is one, and to be put into the queue with it; free again when dropped.
 ///
 /// Apart from the places in the queue: a body that does not come on costs nobody a place. Bodies in memory are at most
 /// uploads, waiting and running jobs together, each of at most the body limit; a multipart one twice while it is split.
 #[derive(Debug)]
 pub struct Upload(#[allow(dead_code, reason = "held for its drop")] OwnedSemaphorePermit);
+
+/// When a request is over.
+#[derive(Debug, Clone, Copy)]
+struct Deadline {
+    at: Instant,
+    /// How long it was, for a person.
+    length: Duration,
+}
+
+impl Deadline {
+    fn after(length: Duration) -> Self {
+        let at = Instant::now() + length;
+        Self { at, length }
+    }
+}
 
 /// What a request may cost.
 #[derive(Debug, Clone, Copy)]
@@ -76,6 +96,11 @@ impl App {
     pub fn start(settings: &ServeArgs, menders: Arc<dyn Menders>) -> io::Result<Arc<Self>> {
         let metrics = Metrics::new().map_err(io::Error::other)?;
         let pool = Pool::start(settings.workers(), settings.queue, metrics.pool())?;
+        let kept = SessionLimits {
+            idle: settings.session_idle,
+            memory: settings.session_memory,
+        };
+        let sessions = Sessions::new(kept, metrics.sessions());
         Ok(Arc::new(Self {
             metrics,
             limits: Limits {
@@ -85,6 +110,7 @@ impl App {
                 uploads: settings.uploads(),
             },
             allow_origin: settings.allow_origin.clone(),
+            sessions,
             pool,
             uploads: Arc::new(Semaphore::new(settings.uploads())),
             menders,
@@ -98,8 +124,8 @@ impl App {
     /// # Errors
     /// The mend's, or that of the pool.
     pub async fn warm_up(&self) -> Result<(), Fault> {
-        let patience = Duration::from_secs(3600);
-        self.work(None, patience, |menders| menders.warm_up())
+        let deadline = Deadline::after(Duration::from_secs(3600));
+        self.work(None, deadline, |menders| menders.warm_up())
             .await?;
         self.warm.store(true, Relaxed);
         Ok(())
@@ -112,14 +138,12 @@ impl App {
     pub fn upload(&self) -> Result<Upload, Fault> {
         let permit = Arc::clone(&self.uploads).try_acquire_owned();
         // Asked after the permit was taken: who has one from before the drain is waited for.
-        if self.draining.load(Relaxed) {
-            return Err(Fault::Draining);
-        }
+        self.serving()?;
         let upload = permit.map(Upload).map_err(|_| Fault::UploadsFull {
             limit: self.limits.uploads,
             retry_after: self.limits.body_pause.as_secs().clamp(1, 60),
         })?;
-        (self.pool.room()).map_err(|error| self.fault(error, self.limits.deadline))?;
+        (self.pool.room()).map_err(|error| fault(error, self.limits.deadline))?;
         Ok(upload)
     }
 
@@ -132,20 +156,40 @@ impl App {
         upload: Upload,
         job: impl FnOnce(&dyn Menders) -> Result<T, Refusal> + Send + 'static,
     ) -> Result<T, Fault> {
-        self.work(Some(upload), self.limits.deadline, job).await
+        let deadline = Deadline::after(self.limits.deadline);
+        self.work(Some(upload), deadline, job).await
+    }
+
+    /// Runs a job on a kept session, on a worker, in the session's turn and within the deadline, which covers waiting for the
+    /// turn. Who waits for a turn holds neither worker nor place in the queue: one session cannot keep others from theirs.
+    /// The session is kept until the job ends, whether or not its caller still waits.
+    ///
+    /// # Errors
+    /// `Session` when it is not to be had, and all that `submit` has.
+    pub async fn submit_to<T: Send + 'static>(
+        &self,
+        id: Uuid,
+        upload: Upload,
+        job: impl FnOnce(&Session) -> Result<T, Refusal> + Send + 'static,
+    ) -> Result<T, Fault> {
+        let deadline = Deadline::after(self.limits.deadline);
+        let lease = self.sessions.lease(id, std::time::Instant::now())?;
+        let turn = timeout_at(deadline.at, lease.turn()).await;
+        let turn = turn.map_err(|_| fault(PoolError::Expired, deadline.length))?;
+        self.work(Some(upload), deadline, move |_| turn.work(job))
+            .await
     }
 
     async fn work<T: Send + 'static>(
         &self,
         upload: Option<Upload>,
-        patience: Duration,
+        deadline: Deadline,
         job: impl FnOnce(&dyn Menders) -> Result<T, Refusal> + Send + 'static,
     ) -> Result<T, Fault> {
         let menders = Arc::clone(&self.menders);
         let outcome = match self.pool.admit() {
             Ok(admission) => {
-                let deadline = Instant::now() + patience;
-                let answer = (self.pool).run(admission, deadline, move || job(&*menders));
+                let answer = (self.pool).run(admission, deadline.at, move || job(&*menders));
                 // Not before the job is in the queue, which a drain closes when no upload is left.
                 drop(upload);
                 answer.await
@@ -164,26 +208,7 @@ impl App {
                 }
                 Err(Fault::Refused(refusal))
             }
-            Err(error) => Err(self.fault(error, patience)),
-        }
-    }
-
-    fn fault(&self, error: PoolError, patience: Duration) -> Fault {
-        match error {
-            PoolError::Full {
-                waiting,
-                running,
-                retry_after,
-            } => Fault::QueueFull {
-                waiting,
-                running,
-                retry_after,
-            },
-            PoolError::Closed => Fault::Draining,
-            PoolError::Expired => Fault::Deadline {
-                seconds: patience.as_secs_f64(),
-            },
-            PoolError::Panicked => Fault::Internal,
+            Err(error) => Err(fault(error, deadline.length)),
         }
     }
 
@@ -192,12 +217,21 @@ impl App {
     /// # Errors
     /// `WarmingUp` or `Draining`.
     pub fn ready(&self) -> Result<(), Fault> {
-        if self.draining.load(Relaxed) {
-            Err(Fault::Draining)
-        } else if self.warm.load(Relaxed) {
-            Ok(())
-        } else {
-            Err(Fault::WarmingUp)
+        self.serving()?;
+        match self.warm.load(Relaxed) {
+            true => Ok(()),
+            false => Err(Fault::WarmingUp),
+        }
+    }
+
+    /// Whether the service shuts down.
+    ///
+    /// # Errors
+    /// `Draining`.
+    pub fn serving(&self) -> Result<(), Fault> {
+        match self.draining.load(Relaxed) {
+            true => Err(Fault::Draining),
+            false => Ok(()),
         }
     }
 
@@ -214,5 +248,24 @@ impl App {
     pub fn close(&self) {
         self.draining.store(true, Relaxed);
         self.pool.close();
+    }
+}
+
+fn fault(error: PoolError, patience: Duration) -> Fault {
+    match error {
+        PoolError::Full {
+            waiting,
+            running,
+            retry_after,
+        } => Fault::QueueFull {
+            waiting,
+            running,
+            retry_after,
+        },
+        PoolError::Closed => Fault::Draining,
+        PoolError::Expired => Fault::Deadline {
+            seconds: patience.as_secs_f64(),
+        },
+        PoolError::Panicked => Fault::Internal,
     }
 }

@@ -58,6 +58,14 @@ pub struct ServeArgs {
     #[arg(long, env = "DARN_MAX_FACES", value_name = "N", default_value = "4000000", value_parser = count)]
     pub max_faces: usize,
 
+    /// Time without a request after which a session ends, such as 15m
+    #[arg(long, env = "DARN_SESSION_IDLE", value_name = "TIME", default_value = "15m", value_parser = duration)]
+    pub session_idle: Duration,
+
+    /// Most memory that all sessions together may take; the least recently used ones end first
+    #[arg(long, env = "DARN_SESSION_MEMORY", value_name = "SIZE", default_value = "512MiB", value_parser = size)]
+    pub session_memory: usize,
+
     /// Origins of web pages that may call the service, such as `https://example.org`; `*` for any
     #[arg(
         long,
@@ -77,9 +85,18 @@ pub struct ServeArgs {
         long,
         env = "DARN_BACKEND",
         value_name = "NAME",
-        default_value = "flex"
+        default_value = "engine"
     )]
     pub backend: Backend,
+
+    /// What differentiates the network in the anchor search: the engine, or burn's autodiff on flex
+    #[arg(
+        long,
+        env = "DARN_AUTODIFF",
+        value_name = "NAME",
+        default_value = "engine"
+    )]
+    pub autodiff: Autodiff,
 
     /// Which log lines are written, such as info or darn=debug
     #[arg(long, env = "DARN_LOG", value_name = "FILTER", default_value = "info")]
@@ -98,10 +115,21 @@ pub struct ServeArgs {
 /// What runs the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Backend {
+    /// darn's own kernels: the fastest.
+    Engine,
     /// burn's flex: fast on a processor.
     Flex,
     /// burn's ndarray: slow, the numerical reference.
     Ndarray,
+}
+
+/// What differentiates the network in the anchor search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Autodiff {
+    /// What runs the network.
+    Engine,
+    /// burn's autodiff on flex.
+    Burn,
 }
 
 impl ServeArgs {

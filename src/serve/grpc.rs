@@ -11,15 +11,16 @@ use tonic::{Code, Request, Response, Status, Streaming, codegen::tokio_stream::S
 
 use super::{
     app::App,
-    errors::Mended,
     intake::{Asked, Patience},
     problem::Fault,
+    question::Question,
+    seam::Mended,
     telemetry::RequestId,
 };
 use crate::contract::{
-    Constraints,
+    Constraints, Search,
     v1::{
-        AnchorFound, HolesReport, InpaintChunk, ScanChunk,
+        self, AnchorFound, HolesReport, InpaintChunk, ScanChunk,
         darn_server::{Darn, DarnServer},
         inpaint_chunk::Part,
     },
@@ -72,7 +73,11 @@ impl Darn for Door {
         &self,
         request: Request<Streaming<ScanChunk>>,
     ) -> Result<Response<AnchorFound>, Status> {
-        Err(Fault::NotServed.grpc(&id(&request)))
+        let id = id(&request);
+        self.search(request.into_inner())
+            .await
+            .map(Response::new)
+            .map_err(|fault| fault.grpc(&id))
     }
 }
 
@@ -87,41 +92,57 @@ impl Door {
     async fn mend(&self, stream: Streaming<ScanChunk>) -> Result<Mended, Fault> {
         let Asked {
             scan,
-            constraints,
+            question,
             upload,
-        } = self.read(stream).await?;
-        let constraints = constraints.unwrap_or_default();
+        } = self.read::<Constraints>(stream).await?;
+        let asked = question.unwrap_or_default();
         let mended = self
             .0
-            .submit(upload, move |menders| menders.inpaint(&scan, &constraints))
+            .submit(upload, move |menders| menders.inpaint(&scan, &asked))
             .await?;
         self.0.metrics.mended(&mended.report);
         Ok(mended)
     }
 
-    async fn read(&self, mut stream: Streaming<ScanChunk>) -> Result<Asked, Fault> {
+    async fn search(&self, stream: Streaming<ScanChunk>) -> Result<AnchorFound, Fault> {
+        let Asked {
+            scan,
+            question,
+            upload,
+        } = self.read::<Search>(stream).await?;
+        let place = "the field `query` of the first chunk";
+        let search = question.ok_or(Fault::NoQuery { place })?;
+        self.0
+            .submit(upload, move |menders| {
+                menders.optimize_anchor(&scan, &search)
+            })
+            .await
+    }
+
+    async fn read<Q: Carried>(&self, mut stream: Streaming<ScanChunk>) -> Result<Asked<Q>, Fault> {
         let upload = self.0.upload()?;
         let limit = self.0.limits.body;
         let patience = Patience::new(&self.0.limits);
-        let mut constraints = None;
+        let mut question = None;
         let mut scan = BytesMut::new();
         let mut first = true;
-        while let Some(chunk) = patience
+        while let Some(mut chunk) = patience
             .next(stream.message())
             .await?
             .map_err(|status| broken(&status, limit))?
         {
-            if let Some(message) = chunk.constraints {
+            if let Some(message) = Q::take(&mut chunk) {
                 if !first {
-                    return Err(Fault::Malformed(
-                        "only the first chunk carries constraints".to_owned(),
-                    ));
+                    let part = Q::PART;
+                    let detail = format!("only the first chunk carries `{part}`");
+                    return Err(Fault::Malformed(detail));
                 }
-                constraints = Some(Constraints::check(&message).map_err(Fault::Constraints)?);
+                question = Some(Q::of(&message)?);
             }
-            if chunk.query.is_some() {
+            if chunk.constraints.is_some() || chunk.query.is_some() {
                 return Err(Fault::Malformed(
-                    "only OptimizeAnchor takes a query".to_owned(),
+                    "OptimizeAnchor takes a query and no constraints, the other methods no query"
+                        .to_owned(),
                 ));
             }
             if scan.len() + chunk.data.len() > limit {
@@ -135,9 +156,27 @@ impl Door {
         }
         Ok(Asked {
             scan: scan.freeze(),
-            constraints,
+            question,
             upload,
         })
+    }
+}
+
+/// A question with its own field in a chunk.
+trait Carried: Question {
+    /// Takes it out of a chunk.
+    fn take(chunk: &mut ScanChunk) -> Option<Self::Message>;
+}
+
+impl Carried for Constraints {
+    fn take(chunk: &mut ScanChunk) -> Option<v1::Constraints> {
+        chunk.constraints.take()
+    }
+}
+
+impl Carried for Search {
+    fn take(chunk: &mut ScanChunk) -> Option<v1::AnchorQuery> {
+        chunk.query.take()
     }
 }
 

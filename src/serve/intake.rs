@@ -1,4 +1,4 @@
-//! Reads a request's body: its bytes within the limit, then the scan and the constraints in them.
+//! Reads a request's body: its bytes within the limit, then the scan in them and what is asked of it.
 
 use std::{future::poll_fn, pin::Pin};
 
@@ -13,8 +13,9 @@ use tokio::time::{Duration, Instant, timeout, timeout_at};
 use super::{
     app::{Limits, Upload},
     problem::Fault,
+    question::{self, Question},
 };
-use crate::contract::{Constraints, FieldError, from_json, v1};
+use crate::contract::{Constraints, FieldError};
 
 /// Bytes of an unwanted body read on, as a multiple of the limit, so that the caller gets to see the answer.
 const DRAIN_FACTOR: u64 = 4;
@@ -22,36 +23,38 @@ const DRAIN_FACTOR: u64 = 4;
 const DRAIN_TIME: Duration = Duration::from_secs(2);
 /// How many of the longest pauses a whole body may take.
 const PAUSES: u32 = 8;
-/// Largest constraints, in bytes.
-const CONSTRAINTS_LIMIT: usize = 1 << 20;
 /// What the body, and its part `scan`, may be sent as; for a person.
 const SCAN_MEDIA: &str = "model/gltf-binary, model/gltf+json or multipart/form-data";
 const SCAN_PART_MEDIA: &str = "model/gltf-binary or model/gltf+json";
-/// The same of the part `constraints`. `application/octet-stream` is read, too: it is what curl says of a file, and says nothing.
-const CONSTRAINTS_MEDIA: &str = "application/json";
+/// The same of the part, for us. `application/octet-stream` is what curl says of a file.
+const SCAN_PART_MEDIA_READ: [&str; 3] = [
+    "model/gltf-binary",
+    "model/gltf+json",
+    "application/octet-stream",
+];
 
 /// What a request carries.
 #[derive(Debug)]
-pub struct Asked {
+pub struct Asked<Q> {
     /// The scan's bytes; not empty.
     pub scan: Bytes,
-    /// The constraints, checked; none when none came.
-    pub constraints: Option<Constraints>,
+    /// What is asked of it, checked; none when none came.
+    pub question: Option<Q>,
     /// The right to be put into the queue.
     pub upload: Upload,
 }
 
-impl Asked {
+impl Asked<Constraints> {
     /// The same, for a job that takes no constraints.
     ///
     /// # Errors
-    /// `Constraints` when some came.
+    /// `Invalid` when some came.
     pub fn unconstrained(self) -> Result<Self, Fault> {
-        if self.constraints.is_none() {
+        if self.question.is_none() {
             return Ok(self);
         }
         let detail = "finding holes takes no constraints in this version";
-        Err(Fault::Constraints(vec![FieldError::new("", detail)]))
+        Err(Constraints::invalid(vec![FieldError::new("", detail)]))
     }
 }
 
@@ -92,30 +95,31 @@ enum Envelope {
     Multipart,
 }
 
-/// Reads a request whose headers have been accepted.
+/// Reads a request whose headers have been accepted: a scan, and what is asked of it as the other part of multipart/form-data.
 ///
 /// # Errors
-/// `UnsupportedMediaType`, `ContentEncoding`, `TooLarge`, `ConstraintsTooLarge`, `BodyTimeout`, `EmptyBody`, `Malformed` or
-/// `Constraints`.
-pub async fn asked(request: Request, upload: Upload, limits: &Limits) -> Result<Asked, Fault> {
-    let (parts, mut body) = request.into_parts();
-    let read = async {
+/// `UnsupportedMediaType`, `ContentEncoding`, `TooLarge`, `AskedTooLarge`, `BodyTimeout`, `EmptyBody`, `Malformed` or
+/// `Invalid`.
+pub async fn asked<Q: Question>(
+    request: Request,
+    upload: Upload,
+    limits: &Limits,
+) -> Result<Asked<Q>, Fault> {
+    let (parts, body) = request.into_parts();
+    let fits = || {
         let envelope = envelope(&parts.headers)?;
         plain(&parts.headers)?;
         announced(&parts.headers, limits.body)?;
-        Ok((envelope, read(&mut body, limits).await?))
+        Ok(envelope)
     };
-    let (envelope, bytes) = match read.await {
+    let (envelope, bytes) = match whole(&parts, body, limits, fits).await {
         Ok(read) => read,
         Err(fault) => {
             drop(upload);
-            if !matches!(fault, Fault::BodyTimeout { .. }) {
-                refuse(&parts.headers, body, limits);
-            }
             return Err(fault);
         }
     };
-    let (scan, constraints) = match envelope {
+    let (scan, question) = match envelope {
         Envelope::Raw => (bytes, None),
         Envelope::Multipart => split(parts, bytes).await?,
     };
@@ -124,9 +128,64 @@ pub async fn asked(request: Request, upload: Upload, limits: &Limits) -> Result<
     }
     Ok(Asked {
         scan,
-        constraints,
+        question,
         upload,
     })
+}
+
+/// Reads a request that asks of a scan already here: its JSON is the body. None when the body is empty.
+///
+/// # Errors
+/// `UnsupportedMediaType`, `ContentEncoding`, `AskedTooLarge`, `BodyTimeout`, `Malformed` or `Invalid`.
+pub async fn question<Q: Question>(request: Request, limits: &Limits) -> Result<Option<Q>, Fault> {
+    let (parts, body) = request.into_parts();
+    let limits = Limits {
+        body: question::LIMIT,
+        ..*limits
+    };
+    let fits = || {
+        plain(&parts.headers)?;
+        announced(&parts.headers, limits.body)?;
+        match essence(content_type(&parts.headers)).as_str() {
+            "" => Ok(false),
+            media if question::MEDIA_READ.contains(&media) => Ok(true),
+            _ => Err(unsupported(&parts.headers, question::MEDIA)),
+        }
+    };
+    let read = whole(&parts, body, &limits, fits).await;
+    let (is_json, text) = read.map_err(|fault| match fault {
+        Fault::TooLarge { limit } => Fault::AskedTooLarge {
+            what: Q::ASKING,
+            limit,
+        },
+        fault => fault,
+    })?;
+    match (text.is_empty(), is_json) {
+        (true, _) => Ok(None),
+        (false, true) => Q::parse(&text).map(Some),
+        (false, false) => Err(unsupported(&parts.headers, question::MEDIA)),
+    }
+}
+
+/// Reads a body to its end when its headers are fit for it; reads it on when it is not wanted.
+async fn whole<T>(
+    parts: &Parts,
+    mut body: Body,
+    limits: &Limits,
+    fits: impl FnOnce() -> Result<T, Fault>,
+) -> Result<(T, Bytes), Fault> {
+    let read = async {
+        let headers = fits()?;
+        Ok((headers, read(&mut body, limits).await?))
+    };
+    let outcome = read.await;
+    if outcome
+        .as_ref()
+        .is_err_and(|fault| !matches!(fault, Fault::BodyTimeout { .. }))
+    {
+        refuse(&parts.headers, body, limits);
+    }
+    outcome
 }
 
 /// Reads an unwanted body on, within bounds and beside the answer, which does not wait for it: a caller that is still
@@ -149,28 +208,31 @@ pub fn refuse(headers: &HeaderMap, mut body: Body, limits: &Limits) {
 }
 
 fn envelope(headers: &HeaderMap) -> Result<Envelope, Fault> {
-    let got = headers
-        .get(header::CONTENT_TYPE)
-        .map_or("", |value| value.to_str().unwrap_or("(not text)"));
-    match got
-        .split(';')
-        .next()
-        .unwrap_or_default()
-        .trim()
-        .to_ascii_lowercase()
-        .as_str()
-    {
+    match essence(content_type(headers)).as_str() {
         "model/gltf-binary" | "model/gltf+json" => Ok(Envelope::Raw),
         "multipart/form-data" => Ok(Envelope::Multipart),
-        _ => Err(Fault::UnsupportedMediaType {
-            got: if got.is_empty() {
-                "(none)".to_owned()
-            } else {
-                format!("`{}`", cut(got, 100))
-            },
-            send: SCAN_MEDIA,
-        }),
+        _ => Err(unsupported(headers, SCAN_MEDIA)),
     }
+}
+
+fn content_type(headers: &HeaderMap) -> &str {
+    headers
+        .get(header::CONTENT_TYPE)
+        .map_or("", |value| value.to_str().unwrap_or("(not text)"))
+}
+
+/// A media type without its parameters, in small letters.
+fn essence(media: &str) -> String {
+    let bare = media.split(';').next().unwrap_or_default();
+    bare.trim().to_ascii_lowercase()
+}
+
+fn unsupported(headers: &HeaderMap, send: &'static str) -> Fault {
+    let got = match content_type(headers) {
+        "" => "(none)".to_owned(),
+        got => format!("`{}`", cut(got, 100)),
+    };
+    Fault::UnsupportedMediaType { got, send }
 }
 
 /// Refuses a compressed body: it would be read as a broken scan.
@@ -224,7 +286,7 @@ async fn piece(body: &mut Body) -> Option<Result<Bytes, axum::Error>> {
     }
 }
 
-async fn split(parts: Parts, bytes: Bytes) -> Result<(Bytes, Option<Constraints>), Fault> {
+async fn split<Q: Question>(parts: Parts, bytes: Bytes) -> Result<(Bytes, Option<Q>), Fault> {
     let malformed = |error: MultipartError| {
         Fault::Malformed(format!("the multipart body: {}", error.body_text()))
     };
@@ -235,36 +297,18 @@ async fn split(parts: Parts, bytes: Bytes) -> Result<(Bytes, Option<Constraints>
         Fault::Malformed(format!("the multipart body: {}", rejection.body_text()))
     })?;
     let mut scan = None;
-    let mut constraints = None;
+    let mut question = None;
     while let Some(field) = form.next_field().await.map_err(malformed)? {
         let name = field.name().unwrap_or_default().to_owned();
-        let media = field.content_type().map(|media| {
-            media
-                .split(';')
-                .next()
-                .unwrap_or_default()
-                .trim()
-                .to_ascii_lowercase()
-        });
+        let media = field.content_type().map(essence);
         let (slot, send, read): (_, _, &[&str]) = match name.as_str() {
-            "scan" => (
-                &mut scan,
-                SCAN_PART_MEDIA,
-                &[
-                    "model/gltf-binary",
-                    "model/gltf+json",
-                    "application/octet-stream",
-                ],
-            ),
-            "constraints" => (
-                &mut constraints,
-                CONSTRAINTS_MEDIA,
-                &["application/json", "application/octet-stream"],
-            ),
+            "scan" => (&mut scan, SCAN_PART_MEDIA, &SCAN_PART_MEDIA_READ),
+            part if part == Q::PART => (&mut question, question::MEDIA, &question::MEDIA_READ),
             _ => {
-                let name = cut(&name, 100);
                 return Err(Fault::Malformed(format!(
-                    "there is no part `{name}`; the parts are `scan` and `constraints`"
+                    "there is no part `{}`; the parts are `scan` and `{}`",
+                    cut(&name, 100),
+                    Q::PART
                 )));
             }
         };
@@ -281,19 +325,8 @@ async fn split(parts: Parts, bytes: Bytes) -> Result<(Bytes, Option<Constraints>
             return Err(Fault::Malformed(format!("the part `{name}` comes twice")));
         }
     }
-    let constraints = constraints.map(|text| parse(&text)).transpose()?;
-    Ok((scan.ok_or(Fault::EmptyBody)?, constraints))
-}
-
-fn parse(text: &[u8]) -> Result<Constraints, Fault> {
-    if text.len() > CONSTRAINTS_LIMIT {
-        return Err(Fault::ConstraintsTooLarge {
-            bytes: text.len(),
-            limit: CONSTRAINTS_LIMIT,
-        });
-    }
-    let message: v1::Constraints = from_json(text)?;
-    Constraints::check(&message).map_err(Fault::Constraints)
+    let question = question.map(|text| Q::parse(&text)).transpose()?;
+    Ok((scan.ok_or(Fault::EmptyBody)?, question))
 }
 
 fn cut(text: &str, most: usize) -> String {

@@ -1,33 +1,46 @@
 //! The service: settings, HTTP and gRPC doors, worker pool, problem documents, metrics, logs, shutdown.
-//! May use: contract, axum, tonic, tokio, and whatever mends through the seam in `errors`.
+//! May use: contract, axum, tonic, tokio, and whatever mends through the seam in `seam`.
 //! May not live here: geometry, glTF, networks; nothing here blocks an async thread.
 
+mod answer;
 mod app;
 mod config;
-mod errors;
+mod editing;
+mod graves;
 mod grpc;
 mod healthcheck;
 mod intake;
+mod job;
 pub mod openapi;
 mod pool;
 mod problem;
+mod question;
 mod routes;
 mod schema;
+mod seam;
+mod session;
+mod sessions;
 mod shutdown;
 mod telemetry;
 
-use std::{future::IntoFuture as _, io, net::SocketAddr, sync::Arc, time::Duration};
+use std::{
+    future::IntoFuture as _,
+    io,
+    net::SocketAddr,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use axum::{Router, serve::ListenerExt as _};
-use tokio::{net::TcpListener, runtime, time};
+use tokio::{net::TcpListener, runtime, task, time};
 use tokio_util::sync::CancellationToken;
 use tracing::{error, info};
 
 pub use self::{
     app::App,
-    config::{Backend, ServeArgs},
-    errors::{Class, Mended, Menders, Refusal},
+    config::{Autodiff, Backend, ServeArgs},
     healthcheck::{HealthError, healthcheck},
+    seam::{Class, Kept, Mended, Menders, PatchForm, Patches, Refusal},
     telemetry::{LogFormat, start_logging},
 };
 
@@ -208,5 +221,8 @@ async fn upkeep(app: Arc<App>) {
     loop {
         tick.tick().await;
         app.metrics.upkeep();
+        // Freeing a large session takes its time, so not on this thread; nothing depends on when it is done.
+        let sessions = Arc::clone(&app.sessions);
+        drop(task::spawn_blocking(move || sessions.sweep(Instant::now())));
     }
 }

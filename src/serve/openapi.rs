@@ -5,6 +5,8 @@ use serde_json::{Map, Value, json};
 
 use super::{problem, schema};
 
+mod editing;
+
 /// The document, as served at `/openapi.json`.
 pub fn document() -> Value {
     let mut schemas = schema::schemas();
@@ -22,6 +24,12 @@ pub fn document() -> Value {
         "paths": {
             "/inpaint": { "post": inpaint() },
             "/holes": { "post": holes() },
+            "/optimize-anchor": { "post": optimize_anchor() },
+            "/sessions": { "post": editing::open() },
+            "/sessions/{id}": { "get": editing::describe(), "delete": editing::delete() },
+            "/sessions/{id}/inpaint": { "post": editing::inpaint() },
+            "/sessions/{id}/optimize-anchor": { "post": editing::optimize_anchor() },
+            "/sessions/{id}/result": { "get": editing::result() },
             "/livez": { "get": probe("Whether the process runs", &[]) },
             "/readyz": { "get": probe("Whether the service mends: warmed up and not shutting down", &[503]) },
             "/metrics": { "get": probe("Metrics in Prometheus text format", &[]) },
@@ -35,32 +43,70 @@ pub fn document() -> Value {
 }
 
 fn inpaint() -> Value {
-    let counted = json!({
-        "darn-holes-filled": { "description": "Holes filled", "schema": { "type": "integer" } },
-        "darn-loops-skipped": { "description": "Boundary loops left as they were", "schema": { "type": "integer" } },
-    });
-    let filled = json!({
-        "description": "The mended scan, in the container of the input. With `Accept: multipart/mixed`: the part `report` \
-            (application/json, schema Report), then the part `scan`.",
-        "headers": counted,
-        "content": {
-            "model/gltf-binary": {},
-            "model/gltf+json": {},
-            "multipart/mixed": { "schema": {
-                "type": "object",
-                "properties": { "report": reference("Report"), "scan": {} },
-            } },
-        },
-    });
     json!({
         "summary": "Fill the holes of a scan",
         "operationId": "inpaint",
-        "requestBody": body(&[("constraints", "Constraints")]),
+        "requestBody": body(&[("constraints", "Constraints")], &[]),
         "responses": responses(
-            filled,
+            ("200", cloth("The mended scan, in the container of the input", "scan", &["model/gltf-binary", "model/gltf+json"])),
             "A scan or constraints that cannot be mended; `errors` names the constraints. With code `no_holes`: the scan has no \
                 hole to fill",
         ),
+    })
+}
+
+fn optimize_anchor() -> Value {
+    let mut found = found();
+    let mended = cloth("", "scan", &["model/gltf-binary", "model/gltf+json"]);
+    found["description"] = format!(
+        "{}. With `Accept: model/gltf-binary`: the scan mended with that anchor, in the container of the input; with \
+            `Accept: multipart/mixed`: the part `report` (application/json, schema Report), then the part `scan`",
+        found["description"].as_str().unwrap_or_default()
+    )
+    .into();
+    for media in ["model/gltf-binary", "model/gltf+json", "multipart/mixed"] {
+        found["content"][media] = mended["content"][media].clone();
+    }
+    json!({
+        "summary": "Find where on a hole's grid a point in space belongs",
+        "operationId": "optimizeAnchor",
+        "requestBody": body(&[("query", "AnchorQuery")], &["query"]),
+        "responses": responses(
+            ("200", found),
+            "A scan or a query that cannot be searched; `errors` names the fields of the query",
+        ),
+    })
+}
+
+/// What an anchor search answers.
+fn found() -> Value {
+    json!({
+        "description": "Where the point belongs. In `map` and `mapGradient`, null stands for a cell outside the hole",
+        "content": { "application/json": { "schema": reference("AnchorFound") } },
+    })
+}
+
+/// Cloth in one of some media types, or beside its report.
+fn cloth(description: &str, part: &str, media: &[&str]) -> Value {
+    let mut content = Map::from_iter(media.iter().map(|media| ((*media).to_owned(), json!({}))));
+    content.insert(
+        "multipart/mixed".to_owned(),
+        json!({ "schema": { "type": "object", "properties": { "report": reference("Report"), part: {} } } }),
+    );
+    json!({
+        "description": format!(
+            "{description}. With `Accept: multipart/mixed`: the part `report` (application/json, schema Report), then the part `{part}`"
+        ),
+        "headers": {
+            "darn-holes-filled": { "description": "Holes filled", "schema": { "type": "integer" } },
+            "darn-loops-skipped": { "description": "Boundary loops left as they were", "schema": { "type": "integer" } },
+            "darn-anchor-distance": {
+                "description": "Largest distance between the cloth and an anchor, those of gestures included, in the scene's unit; \
+                    absent when there are none",
+                "schema": { "type": "number" },
+            },
+        },
+        "content": content,
     })
 }
 
@@ -72,37 +118,39 @@ fn holes() -> Value {
     json!({
         "summary": "Find the boundary loops of a scan, and which of them are holes",
         "operationId": "findHoles",
-        "requestBody": body(&[]),
-        "responses": responses(found, "A scan whose holes cannot be found, or constraints, which are not taken here"),
+        "requestBody": body(&[], &[]),
+        "responses": responses(("200", found), "A scan whose holes cannot be found, or constraints, which are not taken here"),
     })
 }
 
-fn body(beside: &[(&str, &str)]) -> Value {
+/// A scan, alone or with parts beside it, of which some are required: then the scan cannot come alone.
+fn body(beside: &[(&str, &str)], required: &[&str]) -> Value {
     let mut parts = json!({ "scan": { "description": "GLB, or glTF with data URIs" } });
     let mut encoding = json!({ "scan": { "contentType": "model/gltf-binary, model/gltf+json, application/octet-stream" } });
     for (part, schema) in beside {
         parts[*part] = reference(schema);
         encoding[*part] = json!({ "contentType": "application/json, application/octet-stream" });
     }
-    json!({
-        "required": true,
-        "content": {
-            "model/gltf-binary": {},
-            "model/gltf+json": {},
-            "multipart/form-data": {
-                "schema": { "type": "object", "properties": parts, "required": ["scan"] },
-                "encoding": encoding,
-            },
-        },
-    })
+    let needed: Vec<&str> = ["scan"].iter().chain(required).copied().collect();
+    let form = json!({
+        "schema": { "type": "object", "properties": parts, "required": needed },
+        "encoding": encoding,
+    });
+    let content = if required.is_empty() {
+        json!({ "model/gltf-binary": {}, "model/gltf+json": {}, "multipart/form-data": form })
+    } else {
+        json!({ "multipart/form-data": form })
+    };
+    json!({ "required": true, "content": content })
 }
 
-fn responses(success: Value, unprocessable: &str) -> Value {
-    let mut all = Map::from_iter([("200".to_owned(), success)]);
+/// The answers of a route that works: what went well, then every refusal such a route has.
+fn responses((status, success): (&str, Value), unprocessable: &str) -> Value {
+    let mut all = Map::from_iter([(status.to_owned(), success)]);
     for (status, description) in [
         (
             "400",
-            "Not readable: an empty or broken body, not a glTF, constraints that are not JSON",
+            "Not readable: an empty or broken body, not a glTF, no query where one is needed, what is asked not JSON",
         ),
         ("408", "The body stopped coming"),
         (
@@ -162,11 +210,11 @@ fn problem_schema() -> Value {
             "request_id": { "type": "string" },
             "errors": {
                 "type": "array",
-                "description": "The constraints at fault",
+                "description": "The fields at fault of what was asked",
                 "items": {
                     "type": "object",
                     "properties": {
-                        "pointer": { "type": "string", "description": "JSON pointer (RFC 6901) into the constraints; absent when they are at fault as a whole" },
+                        "pointer": { "type": "string", "description": "JSON pointer (RFC 6901) into the constraints or the query; absent when they are at fault as a whole" },
                         "detail": { "type": "string" },
                     },
                     "required": ["detail"],

@@ -1,13 +1,11 @@
 //! A bounded queue in front of a few blocking worker threads. Knows jobs as closures; knows no HTTP and no scans.
 //!
-//! An entry carries its own reply, its tracing span and its place in the queue, so whatever becomes of it is settled in one
-//! spot: an entry whose caller went away or whose deadline passed is skipped, a panic is that entry's error, and the place is
-//! free again when the entry is dropped.
+//! First come, first served, so whoever has a place gets a worker once those before it are done: nobody is overtaken. A job
+//! whose caller went away or whose deadline passed is skipped.
 
 use std::{
     collections::VecDeque,
     io,
-    panic::{AssertUnwindSafe, catch_unwind},
     sync::{
         Arc, Condvar, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed},
@@ -20,9 +18,12 @@ use tokio::{
     sync::{OwnedSemaphorePermit, Semaphore, oneshot},
     time::{Instant, timeout_at},
 };
-use tracing::{Span, warn};
+use tracing::Span;
 
-use super::telemetry::PoolMetrics;
+use super::{
+    job::{Entry, Job},
+    telemetry::PoolMetrics,
+};
 
 /// Longest wait ever suggested, in seconds.
 const LONGEST_RETRY: u64 = 120;
@@ -261,7 +262,7 @@ impl Shared {
             self.metrics
                 .waited
                 .record(begun.duration_since(entry.entered()).as_secs_f64());
-            entry.run(self);
+            entry.run(&self.metrics);
             self.learn(begun.elapsed());
             self.metrics
                 .running
@@ -281,176 +282,6 @@ impl Shared {
     }
 }
 
-trait Entry: Send {
-    /// Whether somebody still waits, and still may.
-    fn is_wanted(&self) -> bool;
-    fn entered(&self) -> Instant;
-    fn run(self: Box<Self>, shared: &Shared);
-}
-
-struct Job<T, W> {
-    work: W,
-    reply: oneshot::Sender<Result<T, PoolError>>,
-    deadline: Instant,
-    entered: Instant,
-    span: Span,
-    admission: Admission,
-}
-
-impl<T: Send, W: FnOnce() -> T + Send> Entry for Job<T, W> {
-    fn is_wanted(&self) -> bool {
-        !self.reply.is_closed() && Instant::now() < self.deadline
-    }
-
-    fn entered(&self) -> Instant {
-        self.entered
-    }
-
-    fn run(self: Box<Self>, shared: &Shared) {
-        let Self {
-            work,
-            reply,
-            span,
-            admission,
-            ..
-        } = *self;
-        let _entered = span.enter();
-        let outcome = catch_unwind(AssertUnwindSafe(work)).map_err(|_| {
-            shared.metrics.panicked.increment(1);
-            PoolError::Panicked
-        });
-        drop(admission);
-        if reply.send(outcome).is_err() {
-            shared.metrics.discarded.increment(1);
-            warn!("nobody waited for the result any more");
-        }
-    }
-}
-
 #[cfg(test)]
-mod tests {
-    use std::sync::mpsc;
-
-    use super::*;
-
-    fn pool(workers: usize, queue: usize) -> Pool {
-        Pool::start(workers, queue, PoolMetrics::unwatched()).unwrap()
-    }
-
-    fn soon() -> Instant {
-        Instant::now() + Duration::from_secs(20)
-    }
-
-    /// A job that runs until told, and tells when it has begun.
-    fn held() -> (
-        impl FnOnce() + Send + 'static,
-        mpsc::Receiver<()>,
-        mpsc::Sender<()>,
-    ) {
-        let (begun, has_begun) = mpsc::channel();
-        let (release, released) = mpsc::channel::<()>();
-        let work = move || {
-            begun.send(()).ok();
-            released.recv().ok();
-        };
-        (work, has_begun, release)
-    }
-
-    #[tokio::test]
-    async fn a_full_pool_says_so_and_frees_places_of_those_who_left() {
-        let pool = Arc::new(pool(1, 1));
-        let (work, begun, release) = held();
-        let first = pool.admit().unwrap();
-        let running = tokio::spawn({
-            let pool = Arc::clone(&pool);
-            async move { pool.run(first, soon(), work).await }
-        });
-        tokio::task::spawn_blocking(move || begun.recv())
-            .await
-            .unwrap()
-            .unwrap();
-
-        let second = pool.admit().unwrap();
-        let mut waiting = Box::pin(pool.run(second, soon(), || panic!("must be skipped")));
-        assert!(futures_poll(&mut waiting).await.is_none());
-        assert_eq!(
-            pool.admit().unwrap_err(),
-            PoolError::Full {
-                waiting: 1,
-                running: 1,
-                retry_after: 1
-            }
-        );
-
-        drop(waiting);
-        let third = pool.admit().unwrap();
-        release.send(()).unwrap();
-        assert_eq!(running.await.unwrap(), Ok(()));
-        assert_eq!(pool.run(third, soon(), || 7).await, Ok(7));
-    }
-
-    #[tokio::test]
-    async fn a_deadline_covers_waiting_and_running() {
-        let pool = Arc::new(pool(1, 4));
-        let (work, begun, release) = held();
-        let admission = pool.admit().unwrap();
-        let running = tokio::spawn({
-            let pool = Arc::clone(&pool);
-            async move {
-                pool.run(admission, Instant::now() + Duration::from_millis(200), work)
-                    .await
-            }
-        });
-        tokio::task::spawn_blocking(move || begun.recv())
-            .await
-            .unwrap()
-            .unwrap();
-        let (tell, told) = mpsc::channel();
-        let waiting = pool
-            .run(
-                pool.admit().unwrap(),
-                Instant::now() + Duration::from_millis(10),
-                move || {
-                    tell.send(()).ok();
-                },
-            )
-            .await;
-        assert_eq!(waiting, Err(PoolError::Expired));
-        assert_eq!(running.await.unwrap(), Err(PoolError::Expired));
-        release.send(()).unwrap();
-        assert_eq!(pool.run(pool.admit().unwrap(), soon(), || 1).await, Ok(1));
-        assert!(told.try_recv().is_err(), "an expired job must not run");
-    }
-
-    #[tokio::test]
-    async fn a_panic_is_its_own_jobs_error_and_a_closed_pool_finishes_what_it_took() {
-        let pool = pool(1, 4);
-        let panicked = pool
-            .run(pool.admit().unwrap(), soon(), || panic!("on purpose"))
-            .await;
-        assert_eq!(panicked, Err::<(), _>(PoolError::Panicked));
-        assert_eq!(pool.run(pool.admit().unwrap(), soon(), || 2).await, Ok(2));
-
-        let last = pool.admit().unwrap();
-        let mut job = Box::pin(pool.run(last, soon(), || 3));
-        let early = futures_poll(&mut job).await;
-        pool.close();
-        assert_eq!(pool.admit().unwrap_err(), PoolError::Closed);
-        let outcome = match early {
-            Some(outcome) => outcome,
-            None => job.await,
-        };
-        assert_eq!(outcome, Ok(3));
-    }
-
-    /// Polls a future once.
-    async fn futures_poll<F: Future + Unpin>(future: &mut F) -> Option<F::Output> {
-        std::future::poll_fn(|cx| {
-            std::task::Poll::Ready(match std::pin::Pin::new(&mut *future).poll(cx) {
-                std::task::Poll::Ready(output) => Some(output),
-                std::task::Poll::Pending => None,
-            })
-        })
-        .await
-    }
-}
+#[path = "pool_tests.rs"]
+mod tests;

@@ -8,7 +8,11 @@ use axum::{
 use serde::Serialize;
 use tonic::{Code, metadata::MetadataValue};
 
-use super::errors::{Class, Refusal};
+use super::{
+    graves::End,
+    seam::{Class, Refusal},
+    sessions::SessionError,
+};
 use crate::contract::{FieldError, JsonError};
 
 /// Media type of a problem document.
@@ -47,13 +51,19 @@ pub enum Fault {
         /// The limit, in bytes.
         limit: usize,
     },
-    /// The constraints are larger than their own limit.
-    #[error("the part `constraints` has {bytes} bytes; its limit is {limit}")]
-    ConstraintsTooLarge {
-        /// What came.
-        bytes: usize,
+    /// What is asked is larger than its own limit.
+    #[error("the {what} larger than {limit} bytes, the limit")]
+    AskedTooLarge {
+        /// What is asked.
+        what: Asking,
         /// The limit, in bytes.
         limit: usize,
+    },
+    /// No query came.
+    #[error("the request carries no query; send it as {place}")]
+    NoQuery {
+        /// Where it belongs.
+        place: &'static str,
     },
     /// The content type is none of ours.
     #[error("content type {got} is not read here; send {send}")]
@@ -69,15 +79,20 @@ pub enum Fault {
         /// What came.
         got: String,
     },
-    /// Constraints that cannot be met by any scan.
-    #[error("the constraints are not valid; `errors` names every field")]
-    Constraints(Vec<FieldError>),
+    /// Constraints or a query that make no sense with any scan.
+    #[error("the {what} not valid; `errors` names every field")]
+    Invalid {
+        /// What is asked.
+        what: Asking,
+        /// Every field at fault.
+        fields: Vec<FieldError>,
+    },
     /// The scan was refused.
     #[error("{}", if .0.class == Class::Internal { INTERNAL } else { .0.detail.as_str() })]
     Refused(Refusal),
-    /// A method of later versions.
-    #[error("not served by this version yet")]
-    NotServed,
+    /// The session is not there, or not to be had.
+    #[error(transparent)]
+    Session(#[from] SessionError),
     /// Too many jobs wait.
     #[error(
         "{waiting} jobs wait and {running} run, which is all this service takes (DARN_QUEUE); try again in {retry_after} s"
@@ -119,6 +134,24 @@ pub enum Fault {
     Internal,
 }
 
+/// What a request asks, as a sentence begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Asking {
+    /// How to mend.
+    Constraints,
+    /// What to search.
+    Query,
+}
+
+impl std::fmt::Display for Asking {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Constraints => "constraints are",
+            Self::Query => "query is",
+        })
+    }
+}
+
 const INTERNAL: &str = "an error of the service itself; its log has it under this request id";
 
 struct Row(StatusCode, &'static str, Code);
@@ -141,11 +174,15 @@ impl Fault {
                 "body_too_large",
                 Code::ResourceExhausted,
             ),
-            Self::ConstraintsTooLarge { .. } => Row(
+            Self::AskedTooLarge { what, .. } => Row(
                 S::PAYLOAD_TOO_LARGE,
-                "constraints_too_large",
+                match what {
+                    Asking::Constraints => "constraints_too_large",
+                    Asking::Query => "query_too_large",
+                },
                 Code::ResourceExhausted,
             ),
+            Self::NoQuery { .. } => Row(S::BAD_REQUEST, "no_query", Code::InvalidArgument),
             Self::ContentEncoding { .. } => Row(
                 S::UNSUPPORTED_MEDIA_TYPE,
                 "unsupported_content_encoding",
@@ -156,9 +193,12 @@ impl Fault {
                 "unsupported_media_type",
                 Code::InvalidArgument,
             ),
-            Self::Constraints(_) => Row(
+            Self::Invalid { what, .. } => Row(
                 S::UNPROCESSABLE_ENTITY,
-                "invalid_constraints",
+                match what {
+                    Asking::Constraints => "invalid_constraints",
+                    Asking::Query => "invalid_query",
+                },
                 Code::InvalidArgument,
             ),
             Self::Refused(refusal) => match refusal.class {
@@ -171,7 +211,7 @@ impl Fault {
                 ),
                 Class::Internal => Row(S::INTERNAL_SERVER_ERROR, "internal", Code::Internal),
             },
-            Self::NotServed => Row(S::NOT_IMPLEMENTED, "not_served", Code::Unimplemented),
+            Self::Session(error) => of_session(error),
             Self::QueueFull { .. } => Row(S::SERVICE_UNAVAILABLE, "queue_full", Code::Unavailable),
             Self::UploadsFull { .. } => {
                 Row(S::SERVICE_UNAVAILABLE, "uploads_full", Code::Unavailable)
@@ -187,6 +227,19 @@ impl Fault {
         }
     }
 
+    /// A text that is not what is asked for.
+    pub fn unread(what: Asking, error: JsonError) -> Self {
+        match error {
+            JsonError::Syntax { detail } => {
+                Self::Malformed(format!("the {what} not JSON: {detail}"))
+            }
+            JsonError::Shape(field) => Self::Invalid {
+                what,
+                fields: vec![field],
+            },
+        }
+    }
+
     /// The HTTP status.
     pub fn status(&self) -> StatusCode {
         self.row().0
@@ -199,7 +252,7 @@ impl Fault {
 
     fn fields(&self) -> &[FieldError] {
         match self {
-            Self::Constraints(fields) => fields,
+            Self::Invalid { fields, .. } => fields,
             Self::Refused(refusal) if refusal.class != Class::Internal => &refusal.fields,
             _ => &[],
         }
@@ -210,7 +263,8 @@ impl Fault {
             Self::QueueFull { retry_after, .. } | Self::UploadsFull { retry_after, .. } => {
                 Some(*retry_after)
             }
-            Self::Draining | Self::WarmingUp => Some(5),
+            Self::Draining | Self::WarmingUp | Self::Session(SessionError::Full { .. }) => Some(5),
+            Self::Session(SessionError::Busy { .. }) => Some(1),
             _ => None,
         }
     }
@@ -271,6 +325,34 @@ impl Fault {
     }
 }
 
+fn of_session(error: &SessionError) -> Row {
+    use StatusCode as S;
+    match error {
+        SessionError::Unknown => Row(S::NOT_FOUND, "session_not_found", Code::NotFound),
+        SessionError::Ended(end) => {
+            let code = match end {
+                End::Idle => "session_expired",
+                End::Evicted => "session_evicted",
+                End::Deleted => "session_deleted",
+            };
+            Row(S::GONE, code, Code::NotFound)
+        }
+        SessionError::Busy { .. } => Row(
+            S::TOO_MANY_REQUESTS,
+            "session_busy",
+            Code::ResourceExhausted,
+        ),
+        SessionError::TooLarge { .. } => Row(
+            S::PAYLOAD_TOO_LARGE,
+            "session_too_large",
+            Code::ResourceExhausted,
+        ),
+        SessionError::Full { .. } => {
+            Row(S::SERVICE_UNAVAILABLE, "sessions_full", Code::Unavailable)
+        }
+    }
+}
+
 /// Handlers return faults bare; the outermost layer, which knows the request's id, renders them.
 impl IntoResponse for Fault {
     fn into_response(self) -> Response {
@@ -284,17 +366,6 @@ impl IntoResponse for Fault {
 impl From<Refusal> for Fault {
     fn from(refusal: Refusal) -> Self {
         Self::Refused(refusal)
-    }
-}
-
-impl From<JsonError> for Fault {
-    fn from(error: JsonError) -> Self {
-        match error {
-            JsonError::Syntax { detail } => {
-                Self::Malformed(format!("the constraints are not JSON: {detail}"))
-            }
-            JsonError::Shape(field) => Self::Constraints(vec![field]),
-        }
     }
 }
 
@@ -314,7 +385,7 @@ pub struct Problem {
 
 #[derive(Debug, Clone, Serialize)]
 struct ProblemField {
-    /// Left out when the constraints as a whole are at fault.
+    /// Left out when what is asked is at fault as a whole.
     #[serde(skip_serializing_if = "String::is_empty")]
     pointer: String,
     detail: String,

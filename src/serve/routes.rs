@@ -4,39 +4,38 @@ use std::{sync::Arc, time::Instant};
 
 use axum::{
     Json, Router,
-    body::Body,
     extract::{MatchedPath, Request, State},
-    http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header},
+    http::{HeaderValue, Method, header},
     middleware::{self, Next},
     response::{IntoResponse, Response},
     routing::{get, post},
 };
+use tokio::task;
 use tower_http::{
     catch_panic::CatchPanicLayer,
     cors::{AllowOrigin, CorsLayer},
 };
 use tracing::{Instrument as _, info, info_span};
-use uuid::Uuid;
 
 use super::{
+    answer::{self, ANCHOR_DISTANCE, Cloth, GLB, GLTF, HOLES_FILLED, JSON, LOOPS_SKIPPED, PARTS},
     app::App,
-    errors::Mended,
+    editing,
     intake::{self, Asked},
     openapi,
     problem::Fault,
+    question::Question,
     telemetry::{REQUEST_ID, RequestId},
 };
-
-/// How many holes were filled, as a header beside the scan.
-pub const HOLES_FILLED: HeaderName = HeaderName::from_static("darn-holes-filled");
-/// How many loops were left as they were.
-pub const LOOPS_SKIPPED: HeaderName = HeaderName::from_static("darn-loops-skipped");
+use crate::contract::{Constraints, Search};
 
 /// The HTTP routes; `finish` turns them into a service.
 pub fn routes() -> Router<Arc<App>> {
     Router::new()
         .route("/inpaint", post(inpaint))
         .route("/holes", post(holes))
+        .route("/optimize-anchor", post(optimize_anchor))
+        .merge(editing::routes())
         .route("/livez", get(|| async { "alive\n" }))
         .route("/readyz", get(readyz))
         .route("/metrics", get(metrics))
@@ -66,14 +65,21 @@ fn cors(origins: &[String]) -> CorsLayer {
     };
     CorsLayer::new()
         .allow_origin(origins)
-        .allow_methods([axum::http::Method::GET, axum::http::Method::POST])
+        .allow_methods([Method::GET, Method::POST, Method::DELETE])
         .allow_headers([
             header::ACCEPT,
             header::AUTHORIZATION,
             header::CONTENT_TYPE,
             REQUEST_ID,
         ])
-        .expose_headers([HOLES_FILLED, LOOPS_SKIPPED, REQUEST_ID, header::RETRY_AFTER])
+        .expose_headers([
+            HOLES_FILLED,
+            LOOPS_SKIPPED,
+            ANCHOR_DISTANCE,
+            REQUEST_ID,
+            header::LOCATION,
+            header::RETRY_AFTER,
+        ])
 }
 
 async fn around(State(app): State<Arc<App>>, mut request: Request, next: Next) -> Response {
@@ -111,22 +117,18 @@ async fn around(State(app): State<Arc<App>>, mut request: Request, next: Next) -
 }
 
 async fn inpaint(State(app): State<Arc<App>>, request: Request) -> Result<Response, Fault> {
-    let in_parts = accepts_parts(request.headers());
+    let wanted = answer::preferred(request.headers(), &[GLB, GLTF, PARTS]);
     let Asked {
         scan,
-        constraints,
+        question,
         upload,
-    } = admitted(&app, request).await?;
-    let constraints = constraints.unwrap_or_default();
+    } = admitted::<Constraints>(&app, request).await?;
+    let asked = question.unwrap_or_default();
     let mended = app
-        .submit(upload, move |menders| menders.inpaint(&scan, &constraints))
+        .submit(upload, move |menders| menders.inpaint(&scan, &asked))
         .await?;
     app.metrics.mended(&mended.report);
-    Ok(if in_parts {
-        parts_response(mended)
-    } else {
-        scan_response(mended)
-    })
+    Ok(Cloth::from(mended).response(wanted))
 }
 
 async fn holes(State(app): State<Arc<App>>, request: Request) -> Result<Response, Fault> {
@@ -137,7 +139,35 @@ async fn holes(State(app): State<Arc<App>>, request: Request) -> Result<Response
     Ok(Json(report).into_response())
 }
 
-async fn admitted(app: &App, request: Request) -> Result<Asked, Fault> {
+async fn optimize_anchor(State(app): State<Arc<App>>, request: Request) -> Result<Response, Fault> {
+    let wanted = answer::preferred(request.headers(), &[JSON, GLB, GLTF, PARTS]);
+    let Asked {
+        scan,
+        question,
+        upload,
+    } = admitted::<Search>(&app, request).await?;
+    let place = "the part `query` of multipart/form-data, beside the part `scan`";
+    let search = question.ok_or(Fault::NoQuery { place })?;
+    if wanted == JSON {
+        let text = app
+            .submit(upload, move |menders| {
+                let found = menders.optimize_anchor(&scan, &search)?;
+                Ok(answer::json(&found))
+            })
+            .await?;
+        return Ok(answer::json_response(text));
+    }
+    let mended = app
+        .submit(upload, move |menders| {
+            menders.mend_to_target(&scan, &search)
+        })
+        .await?;
+    app.metrics.mended(&mended.report);
+    Ok(Cloth::from(mended).response(wanted))
+}
+
+/// A scan and what is asked of it; its body is read only when there is room for the job.
+pub(super) async fn admitted<Q: Question>(app: &App, request: Request) -> Result<Asked<Q>, Fault> {
     match app.upload() {
         Ok(upload) => intake::asked(request, upload, &app.limits).await,
         Err(fault) => {
@@ -153,73 +183,11 @@ async fn readyz(State(app): State<Arc<App>>) -> Result<&'static str, Fault> {
 }
 
 async fn metrics(State(app): State<Arc<App>>) -> impl IntoResponse {
+    // So that no session is counted whose time is over.
+    let sessions = Arc::clone(&app.sessions);
+    (task::spawn_blocking(move || sessions.sweep(Instant::now())).await).ok();
     (
         [(header::CONTENT_TYPE, "text/plain; version=0.0.4")],
         app.metrics.render(),
     )
-}
-
-/// Whether the caller wants scan and report as two parts.
-fn accepts_parts(headers: &HeaderMap) -> bool {
-    (headers.get_all(header::ACCEPT).iter())
-        .filter_map(|value| value.to_str().ok())
-        .flat_map(|value| value.split(','))
-        .any(|media| {
-            media
-                .split(';')
-                .next()
-                .is_some_and(|media| media.trim().eq_ignore_ascii_case("multipart/mixed"))
-        })
-}
-
-fn media_type(scan: &[u8]) -> &'static str {
-    if scan.starts_with(b"glTF") {
-        "model/gltf-binary"
-    } else {
-        "model/gltf+json"
-    }
-}
-
-fn counts(mended: &Mended) -> [(HeaderName, String); 2] {
-    [
-        (HOLES_FILLED, mended.report.holes.len().to_string()),
-        (LOOPS_SKIPPED, mended.report.skipped.len().to_string()),
-    ]
-}
-
-fn scan_response(mended: Mended) -> Response {
-    let media = [(header::CONTENT_TYPE, media_type(&mended.bytes))];
-    (
-        StatusCode::OK,
-        media,
-        counts(&mended),
-        Body::from(mended.bytes),
-    )
-        .into_response()
-}
-
-fn parts_response(mended: Mended) -> Response {
-    let boundary = format!("darn-{}", Uuid::new_v4().simple());
-    let counts = counts(&mended);
-    let media = media_type(&mended.bytes);
-    let report = serde_json::to_vec(&mended.report).unwrap_or_default();
-    let mut body = Vec::with_capacity(mended.bytes.len() + report.len() + 512);
-    for (name, media, bytes) in [
-        ("report", "application/json", &report),
-        ("scan", media, &mended.bytes),
-    ] {
-        let head = format!(
-            "--{boundary}\r\ncontent-disposition: attachment; name=\"{name}\"\r\ncontent-type: {media}\r\ncontent-length: {}\r\n\r\n",
-            bytes.len()
-        );
-        body.extend_from_slice(head.as_bytes());
-        body.extend_from_slice(bytes);
-        body.extend_from_slice(b"\r\n");
-    }
-    body.extend_from_slice(format!("--{boundary}--\r\n").as_bytes());
-    let media = [(
-        header::CONTENT_TYPE,
-        format!("multipart/mixed; boundary={boundary}"),
-    )];
-    (StatusCode::OK, media, counts, Body::from(body)).into_response()
 }

@@ -11,6 +11,8 @@ use serde_json::{Map, Value, json};
 use crate::contract::v1;
 
 const PACKAGE: &str = "darn.v1";
+/// Fields with numbers that may not be numbers; JSON has null for those.
+const HAS_GAPS: [&str; 2] = ["map", "map_gradient"];
 /// Places in a `FileDescriptorProto`, by field number: its messages, its enums, and a message's fields.
 const MESSAGES: i32 = 4;
 const ENUMS: i32 = 5;
@@ -23,12 +25,9 @@ pub(super) fn schemas() -> Map<String, Value> {
     let Some(file) = set.file.iter().find(|file| file.package() == PACKAGE) else {
         return Map::new();
     };
-    let messages = (0..).zip(&file.message_type).filter(|(_, message)| {
-        !matches!(
-            message.name(),
-            "ScanChunk" | "InpaintChunk" | "AnchorQuery" | "AnchorFound" | "SearchStep"
-        )
-    });
+    let messages = (0..)
+        .zip(&file.message_type)
+        .filter(|(_, message)| !matches!(message.name(), "ScanChunk" | "InpaintChunk"));
     let messages =
         messages.map(|(i, message)| (message.name().to_owned(), object(file, i, message)));
     let enums = (0..)
@@ -64,6 +63,7 @@ fn words(file: &FileDescriptorProto, index: i32, e: &EnumDescriptorProto) -> Val
 
 fn property(field: &FieldDescriptorProto) -> Value {
     let one = match field.r#type() {
+        Type::Double if HAS_GAPS.contains(&field.name()) => json!({ "type": ["number", "null"] }),
         Type::Double | Type::Float => json!({ "type": "number" }),
         Type::Bool => json!({ "type": "boolean" }),
         Type::Uint32 | Type::Fixed32 => json!({ "type": "integer", "minimum": 0 }),

@@ -109,6 +109,40 @@ impl PoolMetrics {
     }
 }
 
+/// What the kept sessions count.
+#[derive(Debug)]
+pub struct SessionMetrics {
+    /// Sessions open.
+    pub open: Gauge,
+    /// Bytes they take.
+    pub bytes: Gauge,
+    /// Requests that use one or wait for their turn.
+    pub requests: Gauge,
+    /// Sessions ever opened.
+    pub opened: Counter,
+    /// Ended by idleness.
+    pub expired: Counter,
+    /// Ended for their memory.
+    pub evicted: Counter,
+    /// Ended by their owners.
+    pub deleted: Counter,
+}
+
+impl SessionMetrics {
+    /// Counts nothing.
+    pub fn unwatched() -> Self {
+        Self {
+            open: Gauge::noop(),
+            bytes: Gauge::noop(),
+            requests: Gauge::noop(),
+            opened: Counter::noop(),
+            expired: Counter::noop(),
+            evicted: Counter::noop(),
+            deleted: Counter::noop(),
+        }
+    }
+}
+
 /// The service's metrics; a recorder of its own, so that two services in one process do not mix.
 pub struct Metrics {
     recorder: PrometheusRecorder,
@@ -162,6 +196,27 @@ impl Metrics {
             "holes filled".into(),
         );
         recorder.describe_gauge("darn_jobs".into(), None, "jobs waiting and running".into());
+        recorder.describe_gauge("darn_sessions".into(), None, "sessions open".into());
+        recorder.describe_gauge(
+            "darn_session_bytes".into(),
+            Some(Unit::Bytes),
+            "bytes that open sessions take".into(),
+        );
+        recorder.describe_gauge(
+            "darn_session_requests".into(),
+            None,
+            "requests that use a session or wait for their turn".into(),
+        );
+        recorder.describe_counter(
+            "darn_sessions_opened_total".into(),
+            None,
+            "sessions opened".into(),
+        );
+        recorder.describe_counter(
+            "darn_sessions_ended_total".into(),
+            None,
+            "sessions ended, by reason".into(),
+        );
         let handle = recorder.handle();
         Ok(Self { recorder, handle })
     }
@@ -175,6 +230,24 @@ impl Metrics {
             skipped: self.counter("darn_jobs_total", vec![Label::new("end", "skipped")]),
             discarded: self.counter("darn_jobs_total", vec![Label::new("end", "discarded")]),
             panicked: self.counter("darn_jobs_total", vec![Label::new("end", "panicked")]),
+        }
+    }
+
+    /// The handles the kept sessions count with.
+    pub fn sessions(&self) -> SessionMetrics {
+        let ended = |reason: &str| {
+            let labels = vec![Label::new("reason", reason.to_owned())];
+            self.counter("darn_sessions_ended_total", labels)
+        };
+        let gauge = |name| (self.recorder).register_gauge(&Key::from_name(name), &METADATA);
+        SessionMetrics {
+            open: gauge("darn_sessions"),
+            bytes: gauge("darn_session_bytes"),
+            requests: gauge("darn_session_requests"),
+            opened: self.counter("darn_sessions_opened_total", Vec::new()),
+            expired: ended("idle"),
+            evicted: ended("evicted"),
+            deleted: ended("deleted"),
         }
     }
 

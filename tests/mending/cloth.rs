@@ -1,6 +1,6 @@
 //! Scans with holes, and what to know about a mended one.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use darn::contract::Constraints;
 use darn::mend::{Limits, MendError, Mended, Mender, mend};
@@ -9,7 +9,7 @@ use darn::mesh::loops::{BoundaryLoop, boundary_loops};
 use darn::mesh::topology::Topology;
 use darn::mesh::weld::{Welded, weld};
 use darn::mesh::{TriMesh, Vec2, Vec3};
-use darn::net::{BackendKind, Network};
+use darn::net::{BackendKind, Network, Networks};
 use darn::scan::export::{Fresh, glb};
 use darn::scan::{self, Scan};
 use darn::scarffolds::scanned::{Hole, Scanned, scanned};
@@ -27,11 +27,15 @@ pub const ROUND: Hole = Hole::Circle {
 };
 
 /// The mender, loaded once for all tests.
-pub fn mender() -> &'static Mender {
-    static MENDER: OnceLock<Mender> = OnceLock::new();
-    MENDER.get_or_init(|| Mender {
-        network: Network::load(WEIGHTS, BackendKind::Flex).expect("the shipped weights load"),
-        limits: Limits::default(),
+pub fn mender() -> &'static Arc<Mender> {
+    static MENDER: OnceLock<Arc<Mender>> = OnceLock::new();
+    MENDER.get_or_init(|| {
+        let standard =
+            Network::load(WEIGHTS, BackendKind::default()).expect("the shipped weights load");
+        Arc::new(Mender {
+            networks: Networks::new(standard, Vec::new()),
+            limits: Limits::default(),
+        })
     })
 }
 

@@ -42,8 +42,11 @@ fn holes_of_every_shape_close_and_nothing_else_does() {
 
         let report = &mended.report.holes[0];
         assert_eq!(report.chart.unwrap().flips, 0);
-        assert_eq!(report.patch.unwrap().seam_gap, 0.0);
-        assert_eq!(report.patch.unwrap().faces as usize, after.patch.len());
+        assert_eq!(report.patch.as_ref().unwrap().seam_gap, 0.0);
+        assert_eq!(
+            report.patch.as_ref().unwrap().faces as usize,
+            after.patch.len()
+        );
     }
 }
 

@@ -135,8 +135,9 @@ fn an_anchor_draws_the_cloth_towards_it_and_its_distance_is_told() {
     let anchor = |position| Constraints {
         anchors: vec![Anchor {
             hole: None,
-            uv: [0.5, 0.5],
+            uv: Some([0.5, 0.5]),
             position,
+            hard: false,
         }],
         ..Constraints::default()
     };
@@ -170,8 +171,9 @@ fn an_anchor_beside_the_hole_is_refused() {
     let constraints = Constraints {
         anchors: vec![Anchor {
             hole: None,
-            uv: [0.01, 0.01],
+            uv: Some([0.01, 0.01]),
             position: [0.0, 0.0, 0.0],
+            hard: false,
         }],
         ..Constraints::default()
     };

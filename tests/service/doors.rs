@@ -181,11 +181,6 @@ async fn grpc_has_the_same_errors() {
         let document: Value = serde_json::from_slice(&document).unwrap();
         assert_eq!(document["code"], word);
     }
-    let later = client
-        .optimize_anchor(chunks("cloth", None))
-        .await
-        .unwrap_err();
-    assert_eq!(later.code(), Code::Unimplemented);
 }
 
 #[tokio::test]

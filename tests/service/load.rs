@@ -1,8 +1,14 @@
 //! Queue, deadline, callers who leave, shutdown.
 
-use std::time::{Duration, Instant};
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering::Relaxed},
+    },
+    time::{Duration, Instant},
+};
 
-use crate::harness::{Service, problem};
+use crate::harness::{Service, problem, until};
 
 #[tokio::test]
 async fn a_full_queue_refuses_with_an_estimate() {
@@ -71,6 +77,36 @@ async fn a_caller_who_left_costs_no_work() {
 }
 
 #[tokio::test]
+async fn no_caller_starves() {
+    const REQUESTS: usize = 200;
+    let service = Arc::new(Service::start(&["--workers", "1", "--queue", "8"]).await);
+    let edit = format!("{}/inpaint", service.session("cloth").await);
+    let slow = r#"{"anchors": [{"hole": 6, "position": [0, 0, 0]}]}"#;
+    // Two send scans, two edit the same session; each asks again as soon as it is answered.
+    let answered: Arc<[AtomicUsize; 4]> = Arc::default();
+    let callers = (0..4).map(|caller| {
+        let (service, edit, answered) = (service.clone(), edit.clone(), answered.clone());
+        tokio::spawn(async move {
+            while answered.iter().map(|n| n.load(Relaxed)).sum::<usize>() < REQUESTS {
+                let request = match caller {
+                    0 | 1 => service.scan("slow"),
+                    _ => service.ask(&edit, slow),
+                };
+                assert_eq!(request.send().await.unwrap().status(), 200);
+                answered[caller].fetch_add(1, Relaxed);
+            }
+        })
+    });
+    for caller in callers.collect::<Vec<_>>() {
+        caller.await.unwrap();
+    }
+    for caller in answered.iter() {
+        // A sixth is what two that share a session get of one worker.
+        assert!(caller.load(Relaxed) > REQUESTS / 12, "{answered:?}");
+    }
+}
+
+#[tokio::test]
 async fn a_shutdown_lets_running_work_end() {
     let service = Service::start(&["--workers", "1"]).await;
     let running = tokio::spawn(service.scan("hold").send());
@@ -91,12 +127,4 @@ async fn a_shutdown_is_bounded() {
     ended.expect("the drain was not bounded").unwrap().unwrap();
     service.fake.release();
     running.abort();
-}
-
-async fn until<F: Future<Output = bool>>(holds: impl Fn() -> F) {
-    let patience = Instant::now() + Duration::from_secs(20);
-    while !holds().await {
-        assert!(Instant::now() < patience, "it never came about");
-        tokio::time::sleep(Duration::from_millis(5)).await;
-    }
 }

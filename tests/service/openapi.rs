@@ -56,3 +56,19 @@ fn every_reference_has_its_schema() {
             .is_empty()
     );
 }
+
+#[tokio::test]
+async fn every_path_is_routed_for_its_methods() {
+    let service = Service::start(&[]).await;
+    let document = darn::serve::openapi::document();
+    for (path, methods) in document["paths"].as_object().unwrap() {
+        let path = path.replace("{id}", "0");
+        for method in methods.as_object().unwrap().keys() {
+            let method = reqwest::Method::from_bytes(method.to_uppercase().as_bytes()).unwrap();
+            let answer = service.request(method, &path).send().await.unwrap();
+            let (status, text) = (answer.status(), answer.text().await.unwrap());
+            assert_ne!(status, 405, "{path}");
+            assert!(!text.contains("\"not_found\""), "{path}: {text}");
+        }
+    }
+}

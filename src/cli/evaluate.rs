@@ -1,0 +1,204 @@
+//! `darn evaluate`: what a network's fills are worth on held-out sheets, beside smooth fills and the truth.
+
+use super::failure::{Failure, OrFail};
+use super::files;
+use super::mended::mended;
+use super::network::NetworkArgs;
+use super::progress::Progress;
+use darn::evaluate::{self, Cut, EvaluateError, Plan, Report, ScanRow, Shares};
+use darn::grid::NormalGrid;
+use darn::patch::Options;
+use darn::scarffolds::samples::{Sampler, Turning};
+use darn::scarffolds::sheets::{self, Sheet};
+use image::ImageFormat;
+use serde_json::json;
+use std::io::Cursor;
+use std::path::PathBuf;
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Folder of sheets to be measured on, as `darn scarffolds` makes it; none of them may have been trained on
+    #[arg(long)]
+    sheets: PathBuf,
+    /// How many samples, the sheets in turn
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    samples: usize,
+    /// Seed of the samples
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Keep the sheets upright instead of turning each sample anyhow: for weights that know which way is up
+    #[arg(long)]
+    upright: bool,
+    /// Standard deviations of noise on the known cells, in cells; 0 is always measured
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = noise, default_value = "0")]
+    noise: Vec<f64>,
+    /// Where every measurement goes, as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Where the curves go, as PNG
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
+    /// Mend this many sheets end to end, too, each scanned with a round, a ragged and a long hole
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    scans: usize,
+    /// Compare the holes of training samples with those of flattened scans instead
+    #[arg(long, conflicts_with_all = ["noise", "picture", "upright", "scans"])]
+    masks: bool,
+    #[command(flatten)]
+    network: NetworkArgs,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let name = args.sheets.display();
+    let sheets = sheets::read(&args.sheets).or_fail(format!("read sheets in {name}"))?;
+    if sheets.is_empty() || args.samples == 0 {
+        return Err(Failure::Usage("there is nothing to measure".into()));
+    }
+    let turning = if args.upright {
+        Turning::Upright
+    } else {
+        Turning::Any
+    };
+    let cases = evaluate::draw(&Sampler::new(&sheets, turning), args.samples, args.seed);
+    if args.masks {
+        return masks(args, &sheets, &evaluate::of_samples(&cases));
+    }
+    let mender = args.network.mender()?;
+    let network = mender.networks.default();
+    let fill = |grids: &[NormalGrid]| {
+        let filled = network.fill(grids);
+        filled.map_err(|error| EvaluateError::Filler(Box::new(error)))
+    };
+    let plan = Plan {
+        noises: args.noises(),
+        seed: args.seed,
+        options: Options::default(),
+    };
+    let work = cases.len() * plan.noises.len();
+    let progress = Progress::counted("samples", work as u64);
+    let report = evaluate::run(&cases, &plan, &fill, &|done| progress.advance(done as u64));
+    drop(progress);
+    let report = report.or_fail("evaluate")?;
+    print!("{}", report.markdown());
+    let scans: Vec<Option<ScanRow>> = (Cut::ALL.into_iter())
+        .flat_map(|cut| {
+            let sheets = &sheets[..args.scans.min(sheets.len())];
+            evaluate::over_scans(sheets, cut, args.seed, &|scan| mended(scan, &mender))
+        })
+        .collect();
+    if !scans.is_empty() {
+        print!(
+            "\nScans mended end to end\n\n{}",
+            evaluate::scan_table(&scans)
+        );
+    }
+    if let Some(path) = &args.json {
+        let text = json!({
+            "weights": network.card(), "seed": args.seed, "report": report, "scans": scans,
+        });
+        files::write(path, &pretty(&text)?)?;
+    }
+    match &args.picture {
+        Some(path) => draw(&report, path),
+        None => Ok(()),
+    }
+}
+
+impl Args {
+    /// Levels of noise, ascending, none among them.
+    fn noises(&self) -> Vec<f64> {
+        let mut all = self.noise.clone();
+        all.push(0.0);
+        all.sort_by(f64::total_cmp);
+        all.dedup();
+        all
+    }
+}
+
+fn pretty(value: &serde_json::Value) -> Result<Vec<u8>, Failure> {
+    let mut text = serde_json::to_vec_pretty(value).or_fail("write the report")?;
+    text.push(b'\n');
+    Ok(text)
+}
+
+fn draw(report: &Report, path: &std::path::Path) -> Result<(), Failure> {
+    let mut png = Cursor::new(Vec::new());
+    evaluate::picture(report)
+        .write_to(&mut png, ImageFormat::Png)
+        .or_fail("encode the picture")?;
+    files::write(path, &png.into_inner())
+}
+
+/// Prints and writes how holes share the grid, trained on and seen.
+fn masks(args: &Args, sheets: &[Sheet], trained: &[Shares]) -> Result<(), Failure> {
+    let mut rows: Vec<(String, usize, Vec<Shares>)> =
+        vec![("training samples".into(), 0, trained.to_vec())];
+    for cut in Cut::ALL {
+        let found = evaluate::of_flattened(sheets, cut, args.seed);
+        let flat: Vec<Shares> = found.iter().flatten().copied().collect();
+        let name = format!("flattened, {}", format!("{cut:?}").to_lowercase());
+        rows.push((name, found.len() - flat.len(), flat));
+    }
+    println!(
+        "Quantiles 5 / 25 / 50 / 75 / 95 %, in per cent of the grid (extent: of its side)\n\n\
+         | | grids | refused | unknown | hole | extent of the hole | unknown outside |\n|---|---|---|---|---|---|---|"
+    );
+    for (name, refused, shares) in &rows {
+        let parts: [fn(&Shares) -> f64; 4] =
+            [|s| s.unknown, |s| s.hole, |s| s.extent, |s| s.outside];
+        let cells = parts.map(|part| quantiles(shares.iter().map(part).collect()));
+        println!(
+            "| {name} | {} | {refused} | {} |",
+            shares.len(),
+            cells.join(" | ")
+        );
+    }
+    if let Some(path) = &args.json {
+        let all: Vec<_> = (rows.iter())
+            .map(|(name, refused, shares)| json!({"name": name, "refused": refused, "shares": shares}))
+            .collect();
+        files::write(path, &pretty(&json!(all))?)?;
+    }
+    Ok(())
+}
+
+fn quantiles(mut numbers: Vec<f64>) -> String {
+    numbers.sort_by(f64::total_cmp);
+    let last = numbers.len().saturating_sub(1) as f64;
+    let at = |q: f64| {
+        numbers
+            .get((q * last).round() as usize)
+            .copied()
+            .unwrap_or(0.0)
+    };
+    [0.05, 0.25, 0.5, 0.75, 0.95]
+        .map(|q| format!("{:.0}", 100.0 * at(q)))
+        .join(" / ")
+}
+
+fn noise(text: &str) -> Result<f64, String> {
+    match text.trim().parse() {
+        Ok(sigma) if (0.0..=2.0).contains(&sigma) => Ok(sigma),
+        _ => Err(format!("{text:?} is not a number of cells from 0 to 2")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_are_of_the_sorted_numbers() {
+        let numbers = (0..=100).rev().map(|k| f64::from(k) / 100.0).collect();
+        assert_eq!(quantiles(numbers), "5 / 25 / 50 / 75 / 95");
+        assert_eq!(quantiles(Vec::new()), "0 / 0 / 0 / 0 / 0");
+    }
+
+    #[test]
+    fn noise_is_a_length() {
+        assert_eq!(noise(" 0.25"), Ok(0.25));
+        for wrong in ["-1", "nan", "3", ""] {
+            assert!(noise(wrong).is_err(), "{wrong}");
+        }
+    }
+}

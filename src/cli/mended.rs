@@ -1,0 +1,36 @@
+//! A scan-like mesh mended end to end, as a request would be: written as GLB, read, mended, read again.
+
+use darn::contract::Constraints;
+use darn::evaluate::EvaluateError;
+use darn::mend::{self, Mender};
+use darn::mesh::curvature::vertex_normals;
+use darn::mesh::{TriMesh, Vec3, weld};
+use darn::scan::export::{Fresh, glb};
+use darn::scan::{Limits, Scan};
+use darn::scarffolds::scanned::Scanned;
+use std::error::Error;
+
+/// The mended mesh, welded.
+pub fn mended(scanned: &Scanned, mender: &Mender) -> Result<TriMesh, EvaluateError> {
+    through_glb(scanned, mender).map_err(EvaluateError::Mender)
+}
+
+fn through_glb(
+    scanned: &Scanned,
+    mender: &Mender,
+) -> Result<TriMesh, Box<dyn Error + Send + Sync>> {
+    let triple = |p: &Vec3| [p.x as f32, p.y as f32, p.z as f32];
+    let positions: Vec<[f32; 3]> = scanned.mesh.positions.iter().map(triple).collect();
+    let normals: Vec<[f32; 3]> = vertex_normals(&scanned.mesh).iter().map(triple).collect();
+    let bytes = glb(&Fresh {
+        name: "scan",
+        positions: &positions,
+        normals: &normals,
+        texcoords: &[],
+        faces: &scanned.mesh.faces,
+    })?;
+    let scan = Scan::read(&bytes, &Limits::default())?;
+    let mended = mend::mend(&scan, &Constraints::default(), mender)?;
+    let scan = Scan::read(&mended.bytes, &Limits::default())?;
+    Ok(weld::weld(&scan.surface).mesh)
+}

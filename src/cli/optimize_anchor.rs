@@ -1,0 +1,102 @@
+//! `darn optimize-anchor`: where on a hole's grid a point in space belongs.
+
+use super::failure::{Failure, OrFail};
+use super::files;
+use super::network::NetworkArgs;
+use super::progress::Progress;
+use darn::contract::Search;
+use darn::scan::{Limits, Scan};
+use std::path::PathBuf;
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The scan: GLB, or glTF with data URIs
+    scan: PathBuf,
+    /// The point that the cloth should reach, in scene space
+    #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true)]
+    target: [f64; 3],
+    /// Id of the hole; may be left out when the scan has one
+    #[arg(long)]
+    hole: Option<u32>,
+    /// Where on the chart the search starts; left out, where the cloth is nearest
+    #[arg(long, value_name = "U,V", value_parser = uv)]
+    start: Option<[f64; 2]>,
+    /// Try every cell of the hole
+    #[arg(long)]
+    exhaustive: bool,
+    /// Where a picture of the loss at every cell goes, as PNG; its numbers are then printed, too
+    #[arg(long, value_name = "FILE")]
+    map: Option<PathBuf>,
+    /// Where the scan goes, mended with an anchor at the place that was found
+    #[arg(long, value_name = "FILE")]
+    mend: Option<PathBuf>,
+    #[command(flatten)]
+    network: NetworkArgs,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let name = args.scan.display();
+    let progress = Progress::staged("darn");
+    progress.stage("reading");
+    let bytes = files::read(&args.scan)?;
+    let scan = Scan::read(&bytes, &Limits::default()).or_fail(format!("read {name}"))?;
+    progress.stage("loading weights");
+    let mender = args.network.mender()?;
+    progress.stage("searching");
+    let search = Search {
+        hole: args.hole,
+        target: args.target,
+        start: args.start,
+        exhaustive: args.exhaustive,
+        map: args.map.is_some(),
+    };
+    let mut found =
+        darn::mend::optimize_anchor(&scan, &search, &mender).or_fail(format!("search {name}"))?;
+    if let Some(path) = &args.map {
+        // The picture is in its file; in the JSON it would only be base64.
+        files::write(path, &std::mem::take(&mut found.map_png))?;
+    }
+    if let Some(path) = &args.mend {
+        progress.stage("mending");
+        let anchor = darn::mend::anchor_of(&found, &search);
+        let mended = darn::mend::mend(&scan, &anchor, &mender).or_fail(format!("mend {name}"))?;
+        files::write(path, &mended.bytes)?;
+    }
+    drop(progress);
+    let json = serde_json::to_string_pretty(&found).or_fail("write the answer")?;
+    println!("{json}");
+    Ok(())
+}
+
+/// `N` finite numbers with commas between them.
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let each: Result<Vec<f64>, _> = text.split(',').map(|x| x.trim().parse::<f64>()).collect();
+    let each = each.map_err(|error| error.to_string())?;
+    if let Some(wrong) = each.iter().find(|x| !x.is_finite()) {
+        return Err(format!("{wrong} is not finite"));
+    }
+    <[f64; N]>::try_from(each).map_err(|each| format!("expected {N} numbers; got {}", each.len()))
+}
+
+/// A place on the chart.
+fn uv(text: &str) -> Result<[f64; 2], String> {
+    let uv = numbers::<2>(text)?;
+    match uv.iter().find(|x| !(0.0..=1.0).contains(*x)) {
+        Some(wrong) => Err(format!("expected numbers from 0 to 1; got {wrong}")),
+        None => Ok(uv),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_and_places_are_read() {
+        assert_eq!(numbers::<3>("1, -2.5,3e-2"), Ok([1.0, -2.5, 0.03]));
+        assert!(numbers::<3>("1,2").is_err());
+        assert!(numbers::<3>("1,2,NaN").is_err());
+        assert_eq!(uv("0.25,1"), Ok([0.25, 1.0]));
+        assert!(uv("0.25,1.5").is_err());
+    }
+}
