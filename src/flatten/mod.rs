@@ -295,7 +295,7 @@ mod tests {
             // Chords of the roll are developable, too.
             prop_assert!(chart.stretch_max < 1.01, "{}", chart.stretch_max);
             // What the hole measures on the unrolled sheet, whichever way the frame is turned.
-            let unrolled = |p: Vec3| Vec2::new(p.x.atan2(p.z) / bend, p.y);
+            let unrolled = |p: Vec3| Vec2::new(p.x.atan2(p.z).rem_euclid(std::f64::consts::TAU) / bend, p.y);
             let rim: Vec<Vec2> = (region.rim.iter()).map(|v| unrolled(region.mesh.positions[*v as usize])).collect();
             let sides: Vec<f64> = (0..90).map(|degrees| larger_side(&rim, f64::from(degrees).to_radians())).collect();
             let (least, most) = sides.iter().fold((f64::INFINITY, 0.0f64), |(a, b), s| (a.min(*s), b.max(*s)));
