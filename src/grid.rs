@@ -25,6 +25,8 @@ pub struct NormalGrid {
     pub positions: Vec<[f32; 3]>,
     /// 1 where the position is given, 0 where it is to be filled; values between are soft.
     pub known: Vec<f32>,
+    /// A smooth fill of what the scan alone knows, one position per cell, when it is at hand; anchors are told from it.
+    pub base: Option<Vec<[f32; 3]>>,
 }
 
 /// The similarity between scene space and the network's units.
@@ -134,6 +136,7 @@ impl Grid {
         NormalGrid {
             positions,
             known: self.known.iter().map(|k| f32::from(u8::from(*k))).collect(),
+            base: None,
         }
     }
 

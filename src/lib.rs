@@ -19,4 +19,5 @@ pub mod render;
 pub mod scan;
 pub mod scarffolds;
 pub mod serve;
+pub mod smooth;
 pub mod train;

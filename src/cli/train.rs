@@ -1,7 +1,7 @@
 //! `darn train`: train a network on simulated sheets.
 
 use super::failure::{Failure, OrFail};
-use darn::net::UnetConfig;
+use darn::net::{InputKind, UnetConfig};
 use darn::train::{LossWeights, Progress, Score, Start, TrainOptions};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
@@ -41,6 +41,9 @@ pub struct Args {
     /// Minutes between checkpoints, scores and exported weights
     #[arg(long, default_value_t = TrainOptions::default().every)]
     every: f64,
+    /// What the network sees in unknown cells
+    #[arg(long, value_enum, default_value = "plate")]
+    input: Input,
     /// What counts as an error
     #[arg(long, value_enum, default_value = "standard")]
     loss: Loss,
@@ -56,6 +59,27 @@ pub struct Args {
     /// Start from the weights in this file instead of random ones
     #[arg(long, conflicts_with = "resume")]
     from: Option<PathBuf>,
+}
+
+/// What can be seen in unknown cells.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Input {
+    /// Nothing: zeros (the paper)
+    Zeros,
+    /// A membrane over the known cells
+    Membrane,
+    /// A thin plate over the known cells
+    Plate,
+}
+
+impl Input {
+    fn kind(self) -> InputKind {
+        match self {
+            Self::Zeros => InputKind::Zeros,
+            Self::Membrane => InputKind::Membrane,
+            Self::Plate => InputKind::Plate,
+        }
+    }
 }
 
 /// The losses there are weights for.
@@ -110,6 +134,7 @@ impl Args {
             from: self.from.clone(),
             network: UnetConfig {
                 width: self.width,
+                input: self.input.kind(),
                 ..UnetConfig::default()
             },
             loss: self.loss.weights(),

@@ -3,7 +3,6 @@
 //! No files, no training, no HTTP: sheets come from the caller, and tables go back to it.
 
 mod cases;
-mod fills;
 mod masks;
 mod measure;
 mod patched;
@@ -16,7 +15,6 @@ mod sweep;
 mod tests;
 
 pub use cases::{Case, Size, draw};
-pub use fills::{Smooth, smooth};
 pub use masks::{Cut, Shares, of_flattened, of_samples};
 pub use measure::{Measured, Measures, measure};
 pub use patched::patched;

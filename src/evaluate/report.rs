@@ -17,9 +17,9 @@ pub enum Fill {
     Truth,
     /// The network.
     Network,
-    /// [`super::Smooth::Membrane`].
+    /// [`crate::smooth::Smooth::Membrane`].
     Membrane,
-    /// [`super::Smooth::ThinPlate`].
+    /// [`crate::smooth::Smooth::ThinPlate`].
     ThinPlate,
 }
 

@@ -3,7 +3,6 @@
 use rayon::prelude::*;
 
 use super::cases::Case;
-use super::fills::{Smooth, smooth};
 use super::measure::{Measured, measure};
 use super::patched::patched;
 use super::report::{Fill, Report, Row, Stage, stages};
@@ -11,6 +10,7 @@ use super::{EvaluateError, Filler};
 use crate::grid::{CELLS, Grid, NormalGrid, Normalisation};
 use crate::mesh::Vec3;
 use crate::patch::Options;
+use crate::smooth::{Smooth, smooth};
 
 /// Cases the network gets together.
 const CHUNK: usize = 16;
@@ -122,7 +122,12 @@ impl<'a> Seen<'a> {
             Fill::Membrane => Smooth::Membrane,
             Fill::ThinPlate => Smooth::ThinPlate,
         };
-        let filled = smooth(&self.grid, &self.case.sample.hole, energy);
+        let filled = smooth(
+            &self.grid.positions,
+            &self.grid.known,
+            &self.case.sample.hole,
+            energy,
+        );
         filled.ok_or(EvaluateError::Singular {
             fill: fill.name(),
             sample: self.number,

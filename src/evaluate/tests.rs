@@ -10,6 +10,7 @@ use crate::patch::Options;
 use crate::scarffolds::masks::{self, SHAPES, Shape};
 use crate::scarffolds::samples::{Sample, Sampler, Turning};
 use crate::scarffolds::sheets::Sheet;
+use crate::smooth::{Smooth, smooth};
 
 /// A case on a surface over the unit square, with a hole of the given shape.
 fn case(surface: impl Fn(f64, f64) -> Vec3, shape: Shape, seed: u64) -> Case {
@@ -82,7 +83,8 @@ fn cloth_through_cloth_is_counted() {
 #[test]
 fn both_smooth_fills_keep_a_plane_and_only_the_plate_keeps_a_bend() {
     let worst = |case: &Case, energy| {
-        let filled = smooth(&case.seen(0.0, 1), &case.sample.hole, energy).unwrap();
+        let seen = case.seen(0.0, 1);
+        let filled = smooth(&seen.positions, &seen.known, &case.sample.hole, energy).unwrap();
         measure(case, &filled).measures.rmse
     };
     let parabola = |u: f64, v: f64| Vec3::new(u, v, (u - 0.5) * (v - 0.5));

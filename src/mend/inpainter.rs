@@ -103,10 +103,11 @@ impl<'a> Inpainter<'a> {
 
     /// A grid as the network wants to see it.
     pub fn turned(&self, grid: &NormalGrid) -> NormalGrid {
-        let positions = grid.positions.iter().map(|p| self.entering(*p));
+        let turned = |cells: &[[f32; 3]]| cells.iter().map(|p| self.entering(*p)).collect();
         NormalGrid {
-            positions: positions.collect(),
+            positions: turned(&grid.positions),
             known: grid.known.clone(),
+            base: grid.base.as_deref().map(turned),
         }
     }
 

@@ -12,6 +12,7 @@ use crate::flatten::{self, Chart};
 use crate::grid::{self, CELLS, Grid, NormalGrid, Normalisation};
 use crate::mesh::region::{self, Region};
 use crate::mesh::{Vec2, Vec3};
+use crate::net;
 use crate::patch::{self, Patch, PatchError, Plan};
 
 /// How much of the grid's side the hole should take, so that hole and context share it as in training.
@@ -49,6 +50,8 @@ pub struct Prepared {
     pub report: v1::GridReport,
     /// Milliseconds of preparing it.
     pub timings: v1::HoleTimings,
+    /// A smooth fill of the grid, network's units.
+    base: Option<Vec<[f32; 3]>>,
     polygon: Vec<Vec2>,
     unedited: Mutex<Vec<(Voice, Arc<Unedited>)>>,
 }
@@ -85,7 +88,10 @@ impl Prepared {
 
     /// The grid as the network takes it, without anchors.
     pub fn normal_grid(&self) -> NormalGrid {
-        self.grid.normalised(&self.normal)
+        NormalGrid {
+            base: self.base.clone(),
+            ..self.grid.normalised(&self.normal)
+        }
     }
 
     /// Whether a uv lies in the hole.
@@ -180,8 +186,8 @@ impl Prepared {
         let region = mesh(&self.region.mesh)
             + 4 * (self.region.vertices.len() + self.region.faces.len())
             + 16 * self.chart.flat.len();
-        // Known flag, position, place among the hole's cells.
-        let grid = CELLS * (24 + 1 + 9);
+        // Known flag, position, place among the hole's cells, base.
+        let grid = CELLS * (24 + 1 + 9 + 12);
         let lock = self.unedited.lock().unwrap_or_else(PoisonError::into_inner);
         let each = |u: &Arc<Unedited>| {
             2 * 24 * CELLS + 40 * u.patch.positions.len() + 12 * u.patch.faces.len()
@@ -264,6 +270,7 @@ impl Laid {
         let polygon = self.rim_uv();
         let report = grid_report(&grid, &normal, &polygon);
         let cells = HoleCells::new(|k| !grid.known[k] && inside(&polygon, grid::cell_centre(k)));
+        let base = net::plate(&grid.normalised(&normal).positions, &grid.known);
         let raster = milliseconds(started);
 
         let started = Instant::now();
@@ -289,6 +296,7 @@ impl Laid {
             reach,
             report,
             timings,
+            base,
             polygon,
             unedited: Mutex::default(),
             region,

@@ -9,7 +9,7 @@ use burn::module::{HasAutodiffModule, Module};
 use burn::tensor::{Tensor, TensorData, backend::Backend};
 
 use super::unet::{Unet, UnetConfig};
-use super::{Convolve, Frame, NetError, planes};
+use super::{Convolve, Frame, NetError, base_of, planes};
 use crate::grid::{CELLS, NormalGrid, SIDE};
 
 /// Standard deviation of the Gaussian, in cells: at half its height it is 1.3 cells wide.
@@ -30,6 +30,8 @@ struct Stage<B: Backend> {
     positions: Tensor<B, 4>,
     /// `[1, 1, 64, 64]`.
     known: Tensor<B, 4>,
+    /// `[1, 3, 64, 64]`.
+    base: Option<Tensor<B, 4>>,
     /// `[1, 3]`.
     target: Tensor<B, 2>,
 }
@@ -37,13 +39,15 @@ struct Stage<B: Backend> {
 impl<B: Backend> Stage<B> {
     fn of(config: &UnetConfig, grid: &NormalGrid, target: [f32; 3]) -> Self {
         let device = B::Device::default();
-        let (planes, target) = show(config, grid, target);
+        let (planes, target, base) = show(config, grid, target);
         Stage {
             positions: Tensor::from_data(TensorData::new(planes, [1, 3, SIDE, SIDE]), &device),
             known: Tensor::from_data(
                 TensorData::new(grid.known.clone(), [1, 1, SIDE, SIDE]),
                 &device,
             ),
+            base: base
+                .map(|base| Tensor::from_data(TensorData::new(base, [1, 3, SIDE, SIDE]), &device)),
             target: Tensor::from_data(TensorData::new(target.to_vec(), [1, 3]), &device),
         }
     }
@@ -59,7 +63,9 @@ impl<B: Backend> Stage<B> {
         let bell = along_v.matmul(along_u).reshape([n, 1, SIDE, SIDE]);
         let known = self.known.clone().repeat_dim(0, n);
         let soft = known.clone() + bell.clone() * (known.neg() + 1.0);
-        let answer = unet.predict(config.input, self.positions.clone().repeat_dim(0, n), soft);
+        let base = self.base.clone().map(|base| base.repeat_dim(0, n));
+        let positions = self.positions.clone().repeat_dim(0, n);
+        let answer = unet.predict(config.input, positions, soft, base);
         let weight = bell.reshape([n, 1, CELLS]);
         let total = weight.clone().sum_dim(2);
         let read = (answer.reshape([n, 3, CELLS]) * weight.repeat_dim(1, 3)).sum_dim(2);
@@ -69,12 +75,13 @@ impl<B: Backend> Stage<B> {
     }
 }
 
-/// The scan's positions where known, the target elsewhere, as planes `[3, 64, 64]`, and the target; both in the network's frame.
+/// The scan's positions where known, the target elsewhere, as planes `[3, 64, 64]`; the target; and the base, where the network wants
+/// one. All in the network's frame.
 pub(super) fn show(
     config: &UnetConfig,
     grid: &NormalGrid,
     target: [f32; 3],
-) -> (Vec<f32>, [f32; 3]) {
+) -> (Vec<f32>, [f32; 3], Option<Vec<f32>>) {
     // The anchor itself does not turn the frame: it would make the loss depend on the place in one more way.
     let frame = Frame::of(config.frame, grid);
     let target = frame.enter(target);
@@ -84,7 +91,11 @@ pub(super) fn show(
             std::array::from_fn(|d| known * p[d] + (1.0 - known) * target[d])
         })
         .collect();
-    (planes(std::slice::from_ref(&cells)), target)
+    let base = base_of(config, grid).map(|base| {
+        let turned: Vec<[f32; 3]> = base.iter().map(|p| frame.enter(*p)).collect();
+        planes(&[turned])
+    });
+    (planes(&[cells]), target, base)
 }
 
 /// exp(−(k − x)² / 2σ²) at the cells k of a line: `[n, 1] -> [n, 64]`.

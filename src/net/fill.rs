@@ -1,4 +1,4 @@
-//! What the network sees in unknown cells: nothing (the paper), or a smooth membrane stretched over the known ones.
+//! What the network sees in unknown cells: nothing (the paper), a smooth membrane stretched over the known ones, or a thin plate.
 //! The membrane is a push–pull pyramid with a few Jacobi sweeps a level: close to the harmonic fill, and differentiable in the
 //! positions and in a soft mask, because it is made of products with constant matrices only.
 
@@ -7,6 +7,8 @@ use burn::tensor::{Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
 use crate::grid::SIDE;
+use crate::mesh::Vec3;
+use crate::smooth::{Smooth, smooth};
 
 /// What unknown cells hold when the network sees them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -15,8 +17,23 @@ pub enum InputKind {
     /// Zeros, and the network answers with positions (the paper).
     Zeros,
     /// The membrane, and the network answers with what to add to it.
-    #[default]
     Membrane,
+    /// A thin plate over what the scan knows, with anchors laid over it by the membrane of their distance from it; the network answers
+    /// with what to add. On held-out sheets the plate is half as far from the truth as the membrane.
+    #[default]
+    Plate,
+}
+
+/// The fill of [`InputKind::Plate`] in every cell that is not known, known cells as they are; the network's units in any frame.
+///
+/// `None` when too few cells are known to determine it.
+pub fn plate(positions: &[[f32; 3]], known: &[bool]) -> Option<Vec<[f32; 3]>> {
+    let wide: Vec<Vec3> = (positions.iter())
+        .map(|p| Vec3::from(p.map(f64::from)))
+        .collect();
+    let open: Vec<bool> = known.iter().map(|k| !k).collect();
+    let filled = smooth(&wide, known, &open, Smooth::TautPlate)?;
+    Some(filled.iter().map(|p| p.cast::<f32>().into()).collect())
 }
 
 /// Sweeps at the levels of side 64, 32, 16, 8, 4, 2. On scarves with holes of 10 to 36 cells these leave a quarter of a cell (RMS)
@@ -26,6 +43,18 @@ pub(super) const SWEEPS: [usize; 6] = [8, 16, 16, 16, 8, 4];
 pub(super) const SATURATION: f32 = 4.0;
 /// Guards the mean of a coarse cell that holds nothing known.
 pub(super) const NOTHING: f32 = 1e-6;
+
+/// A base, where there is one, and over it the membrane of how far known positions are from it; shapes as of [`membrane`].
+pub fn over<B: Backend>(
+    base: Option<Tensor<B, 4>>,
+    positions: Tensor<B, 4>,
+    known: Tensor<B, 4>,
+) -> Tensor<B, 4> {
+    match base {
+        Some(base) => membrane(positions - base.clone(), known) + base,
+        None => membrane(positions, known),
+    }
+}
 
 /// Fills unknown cells smoothly from the known ones.
 ///

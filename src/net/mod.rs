@@ -28,7 +28,7 @@ use crate::grid::{CELLS, NormalGrid, SIDE};
 
 pub use anchor::AnchorLoss;
 pub use convolve::Convolve;
-pub use fill::{InputKind, membrane};
+pub use fill::{InputKind, membrane, over, plate};
 pub use frame::{Frame, FrameKind};
 pub use networks::Networks;
 pub use unet::{Unet, UnetConfig};
@@ -187,13 +187,13 @@ impl Network {
         let mut answers = Vec::with_capacity(grids.len());
         for chunk in grids.chunks(BATCH) {
             answers.extend(match &self.forward {
-                Runtime::Engine(engine) => seen(config, chunk, |x, k, n| engine.predict(x, k, n))?,
+                Runtime::Engine(engine) => seen(config, chunk, |shown| engine.predict(&shown))?,
                 Runtime::Flex(unet) => {
-                    seen(config, chunk, |x, k, n| Ok(predict(unet, config, x, k, n)))?
+                    seen(config, chunk, |shown| Ok(predict(unet, config, shown)))?
                 }
                 #[cfg(feature = "ndarray")]
                 Runtime::Ndarray(unet) => {
-                    seen(config, chunk, |x, k, n| Ok(predict(unet, config, x, k, n)))?
+                    seen(config, chunk, |shown| Ok(predict(unet, config, shown)))?
                 }
             });
         }
@@ -278,10 +278,10 @@ impl Runtime {
 }
 
 fn check_sizes(grids: &[NormalGrid]) -> Result<(), NetError> {
-    match grids
-        .iter()
-        .position(|grid| grid.positions.len() != CELLS || grid.known.len() != CELLS)
-    {
+    match grids.iter().position(|grid| {
+        let base = grid.base.as_ref().map_or(CELLS, Vec::len);
+        [grid.positions.len(), grid.known.len(), base] != [CELLS; 3]
+    }) {
         Some(index) => Err(NetError::GridSize {
             index,
             positions: grids[index].positions.len(),
@@ -291,26 +291,52 @@ fn check_sizes(grids: &[NormalGrid]) -> Result<(), NetError> {
     }
 }
 
-/// Grids of checked size turned to the network's frame, shown to it as planes (positions, known, count), its answer turned back.
+/// What is shown to the network at once: planes of some grids, in its frame.
+struct Shown {
+    /// `[count, 3, 64, 64]`.
+    positions: Vec<f32>,
+    /// `[count, 1, 64, 64]`.
+    known: Vec<f32>,
+    /// `[count, 3, 64, 64]`, for networks that want it.
+    base: Option<Vec<f32>>,
+}
+
+/// The fill that a network wants under a grid's anchors, in the grid's frame: the grid's own, else made of its known cells.
+fn base_of(config: &UnetConfig, grid: &NormalGrid) -> Option<Vec<[f32; 3]>> {
+    let wanted = config.input == InputKind::Plate;
+    let made = || {
+        let known: Vec<bool> = grid.known.iter().map(|k| *k > 0.5).collect();
+        // A grid of which next to nothing is known has no plate: then a membrane alone is seen.
+        let plate = plate(&grid.positions, &known);
+        plate.unwrap_or_else(|| vec![[0.0; 3]; CELLS])
+    };
+    wanted.then(|| grid.base.clone().unwrap_or_else(made))
+}
+
+/// Grids of checked size turned to the network's frame, shown to it, its answer turned back.
 fn seen(
     config: &UnetConfig,
     grids: &[NormalGrid],
-    answer: impl FnOnce(Vec<f32>, Vec<f32>, usize) -> Result<Vec<f32>, NetError>,
+    answer: impl FnOnce(Shown) -> Result<Vec<f32>, NetError>,
 ) -> Result<Vec<Vec<[f32; 3]>>, NetError> {
     let frames: Vec<Frame> = grids
         .iter()
         .map(|grid| Frame::of(config.frame, grid))
         .collect();
-    let turned: Vec<Vec<[f32; 3]>> = grids
-        .iter()
-        .zip(&frames)
-        .map(|(grid, frame)| grid.positions.iter().map(|p| frame.enter(*p)).collect())
+    let turned = |cells: &[[f32; 3]], frame: &Frame| -> Vec<[f32; 3]> {
+        cells.iter().map(|p| frame.enter(*p)).collect()
+    };
+    let each = || grids.iter().zip(&frames);
+    let positions: Vec<_> = each().map(|(g, f)| turned(&g.positions, f)).collect();
+    let base: Option<Vec<_>> = each()
+        .map(|(g, f)| Some(turned(&base_of(config, g)?, f)))
         .collect();
-    let known: Vec<f32> = grids
-        .iter()
-        .flat_map(|grid| grid.known.iter().copied())
-        .collect();
-    let answer = answer(planes(&turned), known, grids.len())?;
+    let known = grids.iter().flat_map(|grid| grid.known.iter().copied());
+    let answer = answer(Shown {
+        positions: planes(&positions),
+        known: known.collect(),
+        base: base.map(|base| planes(&base)),
+    })?;
     let cells = answer.chunks_exact(3 * CELLS).map(cells);
     Ok(cells
         .zip(&frames)
@@ -319,17 +345,18 @@ fn seen(
 }
 
 /// One pass of burn's network over planes.
-fn predict<B: Convolve>(
-    unet: &Unet<B>,
-    config: &UnetConfig,
-    positions: Vec<f32>,
-    known: Vec<f32>,
-    count: usize,
-) -> Vec<f32> {
+fn predict<B: Convolve>(unet: &Unet<B>, config: &UnetConfig, shown: Shown) -> Vec<f32> {
     let device = B::Device::default();
-    let positions = Tensor::from_data(TensorData::new(positions, [count, 3, SIDE, SIDE]), &device);
-    let known = Tensor::from_data(TensorData::new(known, [count, 1, SIDE, SIDE]), &device);
-    unet.predict(config.input, positions, known)
+    let count = shown.known.len() / CELLS;
+    let tensor = |planes: Vec<f32>, channels: usize| {
+        Tensor::from_data(
+            TensorData::new(planes, [count, channels, SIDE, SIDE]),
+            &device,
+        )
+    };
+    let (positions, known) = (tensor(shown.positions, 3), tensor(shown.known, 1));
+    let base = shown.base.map(|base| tensor(base, 3));
+    unet.predict(config.input, positions, known, base)
         .into_data()
         .convert::<f32>()
         .into_vec::<f32>()

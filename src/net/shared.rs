@@ -2,10 +2,9 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use super::engine::{self, Cotangent, Engine, Gradient, Scratch};
+use super::engine::{self, Cotangent, Engine, Gradient, Input, Scratch};
 use super::weights::NamedTensors;
-use super::{NetError, UnetConfig};
-use crate::grid::CELLS;
+use super::{NetError, Shown, UnetConfig};
 
 /// An engine and the room of the calls that are over.
 #[derive(Debug)]
@@ -30,20 +29,14 @@ impl Shared {
         })
     }
 
-    /// Predicts all cells of `count` grids: `[count, 3, 64, 64]`, `[count, 1, 64, 64] -> [count, 3, 64, 64]`.
+    /// Predicts all cells of what is shown: `[count, 3, 64, 64]`.
     ///
     /// # Errors
     /// Planes of another size.
-    pub fn predict(
-        &self,
-        positions: Vec<f32>,
-        known: Vec<f32>,
-        count: usize,
-    ) -> Result<Vec<f32>, NetError> {
-        let mut out = vec![0.0; count * 3 * CELLS];
+    pub fn predict(&self, shown: &Shown) -> Result<Vec<f32>, NetError> {
+        let mut out = vec![0.0; 3 * shown.known.len()];
         let mut scratch = self.room();
-        self.engine
-            .predict(&mut scratch, &positions, &known, &mut out)?;
+        self.engine.predict(&mut scratch, shown.input(), &mut out)?;
         self.lock().push(scratch);
         Ok(out)
     }
@@ -54,12 +47,12 @@ impl Shared {
     /// Planes of another size.
     pub fn by_known(
         &self,
-        (positions, known): (&[f32], &[f32]),
+        shown: &Shown,
         cotangent: &Cotangent,
     ) -> Result<(Vec<f32>, Vec<f32>), NetError> {
-        let mut prediction = vec![0.0; positions.len()];
-        let mut by_positions = vec![0.0; positions.len()];
-        let mut by_known = vec![0.0; known.len()];
+        let mut prediction = vec![0.0; shown.positions.len()];
+        let mut by_positions = vec![0.0; shown.positions.len()];
+        let mut by_known = vec![0.0; shown.known.len()];
         let mut scratch = self.room();
         let out = Gradient {
             prediction: &mut prediction,
@@ -67,7 +60,7 @@ impl Shared {
             by_known: &mut by_known,
         };
         self.engine
-            .gradient(&mut scratch, (positions, known), cotangent, out)?;
+            .gradient(&mut scratch, shown.input(), cotangent, out)?;
         self.lock().push(scratch);
         Ok((prediction, by_known))
     }
@@ -80,5 +73,15 @@ impl Shared {
     fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Scratch>> {
         // Nothing that is done under the lock can panic half-way.
         self.idle.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Shown {
+    fn input(&self) -> Input<'_> {
+        Input {
+            positions: &self.positions,
+            known: &self.known,
+            base: self.base.as_deref(),
+        }
     }
 }

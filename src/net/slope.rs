@@ -6,7 +6,7 @@
 
 use super::anchor::{AnchorLoss, SIGMA, show};
 use super::shared::Shared;
-use super::{NetError, UnetConfig};
+use super::{NetError, Shown, UnetConfig};
 use crate::grid::{CELLS, NormalGrid, SIDE};
 
 /// A bell at a place of the grid.
@@ -61,9 +61,9 @@ impl Bell {
 
 /// A search's grid as planes, repeated for each place, and the places' bells.
 struct Stage {
-    positions: Vec<f32>,
+    /// With the soft mask.
+    shown: Shown,
     known: Vec<f32>,
-    soft: Vec<f32>,
     target: [f32; 3],
     bells: Vec<Bell>,
 }
@@ -74,16 +74,19 @@ impl Stage {
         (grid, target): (&NormalGrid, [f32; 3]),
         uvs: &[[f32; 2]],
     ) -> Stage {
-        let (planes, target) = show(config, grid, target);
+        let (planes, target, base) = show(config, grid, target);
         let bells: Vec<Bell> = uvs.iter().map(Bell::new).collect();
         let soft = bells.iter().flat_map(|bell| {
             let each = grid.known.iter().enumerate();
             each.map(|(cell, known)| known + bell.of(cell) * (1.0 - known))
         });
         Stage {
-            positions: planes.repeat(uvs.len()),
+            shown: Shown {
+                positions: planes.repeat(uvs.len()),
+                known: soft.collect(),
+                base: base.map(|base| base.repeat(uvs.len())),
+            },
             known: grid.known.clone(),
-            soft: soft.collect(),
             target,
             bells,
         }
@@ -153,12 +156,8 @@ pub fn losses(
     search: (&NormalGrid, [f32; 3]),
     uvs: &[[f32; 2]],
 ) -> Result<Vec<f32>, NetError> {
-    let mut stage = Stage::new(config, search, uvs);
-    let planes = (
-        std::mem::take(&mut stage.positions),
-        std::mem::take(&mut stage.soft),
-    );
-    let answer = engine.predict(planes.0, planes.1, uvs.len())?;
+    let stage = Stage::new(config, search, uvs);
+    let answer = engine.predict(&stage.shown)?;
     let each = answer.chunks_exact(3 * CELLS).enumerate();
     each.map(|(place, prediction)| stage.loss(place, prediction))
         .collect()
@@ -175,7 +174,7 @@ pub fn gradients(
     let cotangent = |place: usize, prediction: &[f32], by: &mut [f32]| {
         stage.by_prediction(place, prediction, by)
     };
-    let (predictions, by_soft) = engine.by_known((&stage.positions, &stage.soft), &cotangent)?;
+    let (predictions, by_soft) = engine.by_known(&stage.shown, &cotangent)?;
     let each = (predictions.chunks_exact(3 * CELLS)).zip(by_soft.chunks_exact(CELLS));
     each.enumerate()
         .map(|(place, answer)| stage.slope(place, answer))

@@ -54,6 +54,7 @@ fn bent(hole: impl Fn(usize, usize) -> bool) -> NormalGrid {
     let mut grid = NormalGrid {
         positions: Vec::new(),
         known: Vec::new(),
+        base: None,
     };
     for k in 0..CELLS {
         let uv = cell_centre(k);
@@ -96,7 +97,7 @@ fn backends_have_names() {
 #[cfg(feature = "ndarray")]
 #[test]
 fn backends_agree_with_the_reference() {
-    for input in [InputKind::Membrane, InputKind::Zeros] {
+    for input in [InputKind::Plate, InputKind::Membrane, InputKind::Zeros] {
         let config = UnetConfig { input, ..CONFIG };
         let bytes = write(&tensors(config), &card(config)).unwrap();
         let grids = [bent(disk), bent(|i, j| i > 40 || j < 5)];
@@ -303,6 +304,7 @@ fn a_hole_in_a_plane_is_filled_with_the_plane() {
         .fill(&[NormalGrid {
             positions: plane.clone(),
             known,
+            base: None,
         }])
         .unwrap();
     // The sweeps stop short of convergence; the hole is 20 cells wide.
@@ -346,6 +348,7 @@ fn the_fill_turns_with_the_cloth() {
             .fill(&[NormalGrid {
                 positions: turned(&grid.positions),
                 known: grid.known.clone(),
+                base: None,
             }])
             .unwrap();
         assert!(largest_distance(&answer[0], &turned(&straight[0])) < 1e-3 * CELL);
@@ -371,6 +374,7 @@ fn grids_that_cannot_be_filled_are_named() {
     let short = NormalGrid {
         positions: vec![[0.0; 3]; 5],
         known: vec![1.0; CELLS],
+        base: None,
     };
     assert!(matches!(
         network.fill(&[bent(disk), short]),
@@ -389,6 +393,7 @@ fn grids_that_cannot_be_filled_are_named() {
     let nothing = NormalGrid {
         positions: vec![[0.0; 3]; CELLS],
         known: vec![0.0; CELLS],
+        base: None,
     };
     assert!(
         network.fill(&[nothing]).unwrap()[0]
@@ -512,8 +517,17 @@ fn the_anchor_loss_falls_as_its_gradient_says() {
 
 #[test]
 fn the_engines_gradient_is_that_of_burns_autodiff() {
-    for frame in [FrameKind::Canonical, FrameKind::Given] {
-        let config = UnetConfig { frame, ..CONFIG };
+    let kinds = [
+        (FrameKind::Canonical, InputKind::Plate),
+        (FrameKind::Given, InputKind::Membrane),
+        (FrameKind::Canonical, InputKind::Zeros),
+    ];
+    for (frame, input) in kinds {
+        let config = UnetConfig {
+            frame,
+            input,
+            ..CONFIG
+        };
         let bytes = write(&tensors(config), &card(config)).unwrap();
         let grid = bent(disk);
         let uvs = [[0.5, 0.5], [0.45, 0.56], [0.52, 0.41]];
@@ -536,4 +550,29 @@ fn the_engines_gradient_is_that_of_burns_autodiff() {
             }
         }
     }
+}
+
+#[test]
+fn an_anchor_on_the_plate_moves_no_cell_of_what_the_network_sees() {
+    let config = UnetConfig {
+        input: InputKind::Plate,
+        ..CONFIG
+    };
+    let network = Network::load(&silent(config), BackendKind::Engine).unwrap();
+    let mut grid = bent(disk);
+    let known: Vec<bool> = grid.known.iter().map(|k| *k > 0.5).collect();
+    let base = plate(&grid.positions, &known).unwrap();
+    grid.base = Some(base.clone());
+    let free = network.fill(std::slice::from_ref(&grid)).unwrap();
+    assert!(largest_distance(&free[0], &base) < 1e-5);
+    let cell = 32 * SIDE + 32;
+    (grid.positions[cell], grid.known[cell]) = (base[cell], 1.0);
+    let on_it = network.fill(std::slice::from_ref(&grid)).unwrap();
+    assert!(largest_distance(&on_it[0], &base) < 1e-5);
+    grid.positions[cell][2] += 0.1;
+    let lifted = network.fill(std::slice::from_ref(&grid)).unwrap();
+    assert!(lifted[0][cell][2] > base[cell][2] + 0.09);
+    let beside = cell + 3;
+    let rise = lifted[0][beside][2] - base[beside][2];
+    assert!((0.01..0.1).contains(&rise), "{rise}");
 }

@@ -39,7 +39,7 @@ impl Default for UnetConfig {
     fn default() -> Self {
         UnetConfig {
             width: 16,
-            input: InputKind::Membrane,
+            input: InputKind::Plate,
             frame: FrameKind::Canonical,
         }
     }
@@ -107,12 +107,14 @@ impl<B: Convolve> Unet<B> {
     /// Predicts all cells from the known ones, in the network's units.
     ///
     /// `positions [batch, 3, 64, 64]`, `known [batch, 1, 64, 64]` in 0..=1 `-> [batch, 3, 64, 64]`. Positions of unknown cells are not
-    /// looked at. Differentiable in both. The prediction is the network's own for every cell, known ones too.
+    /// looked at. Differentiable in both. The prediction is the network's own for every cell, known ones too. `base [batch, 3, 64, 64]` is
+    /// the fill of [`InputKind::Plate`]; without it, and for other inputs, zero.
     pub fn predict(
         &self,
         input: InputKind,
         positions: Tensor<B, 4>,
         known: Tensor<B, 4>,
+        base: Option<Tensor<B, 4>>,
     ) -> Tensor<B, 4> {
         match input {
             InputKind::Zeros => {
@@ -121,8 +123,8 @@ impl<B: Convolve> Unet<B> {
                     1,
                 )) * OUTPUT_SCALE
             }
-            InputKind::Membrane => {
-                let filled = fill::membrane(positions, known.clone());
+            InputKind::Membrane | InputKind::Plate => {
+                let filled = fill::over(base, positions, known.clone());
                 self.residual(filled.clone(), known) + filled
             }
         }

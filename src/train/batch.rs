@@ -9,7 +9,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::grid::{CELLS, NormalGrid, SIDE, cell_index, neighbour_pairs};
-use crate::net::{Frame, FrameKind};
+use crate::net::{Frame, FrameKind, InputKind, UnetConfig, plate};
 use crate::scarffolds::samples::Sample;
 
 /// Share of samples whose known cells are noisy.
@@ -22,13 +22,15 @@ const ANCHORED: f64 = 0.15;
 const ANCHORS: usize = 6;
 /// Weight in the data loss of cells that were known: keeps the network's opinion sane there at little cost.
 const KNOWN_WEIGHT: f32 = 0.1;
+/// The base of a network that wants none.
+const NO_BASE: [[f32; 3]; CELLS] = [[0.0; 3]; CELLS];
 /// Batches each thread makes ahead.
 const AHEAD: usize = 2;
 
 /// A sample in the network's units and frame.
 #[derive(Debug, Clone)]
 pub struct Prepared {
-    /// What the network gets.
+    /// What the network gets, its base included.
     pub input: NormalGrid,
     /// The truth in the same units and frame; zero where not `valid`.
     pub truth: Vec<[f32; 3]>,
@@ -49,6 +51,8 @@ pub struct Batch {
     pub positions: Vec<f32>,
     /// `[count, 1, 64, 64]`.
     pub known: Vec<f32>,
+    /// The fill under anchors, zero where there is none; `[count, 3, 64, 64]`.
+    pub base: Vec<f32>,
     /// `[count, 3, 64, 64]`.
     pub truth: Vec<f32>,
     /// Weight of each cell in the data loss, `[count, 1, 64, 64]`.
@@ -62,14 +66,16 @@ pub struct Batch {
 }
 
 /// Brings a sample to the network's units and frame without changing it otherwise; `None` when too little is known.
-pub fn prepare(sample: &Sample, frame: FrameKind) -> Option<Prepared> {
-    prepare_noisy(sample, &vec![[0.0; 3]; CELLS], frame)
+pub fn prepare(sample: &Sample, network: &UnetConfig) -> Option<Prepared> {
+    let still = vec![[0.0; 3]; CELLS];
+    prepare_noisy(sample, (&sample.known, &still), network)
 }
 
 /// A random variant of a sample: one of the grid's 8 symmetries, perhaps mirrored, noisy or with anchors.
-pub fn augment(sample: &Sample, frame: FrameKind, rng: &mut ChaCha8Rng) -> Option<Prepared> {
+pub fn augment(sample: &Sample, network: &UnetConfig, rng: &mut ChaCha8Rng) -> Option<Prepared> {
     let mut sample = symmetric(sample, rng.random_range(0..8));
-    if frame == FrameKind::Canonical && rng.random() {
+    let scanned = sample.known.clone();
+    if network.frame == FrameKind::Canonical && rng.random() {
         sample.truth.iter_mut().for_each(|p| p[0] = -p[0]);
     }
     if rng.random_bool(ANCHORED) {
@@ -89,11 +95,15 @@ pub fn augment(sample: &Sample, frame: FrameKind, rng: &mut ChaCha8Rng) -> Optio
     let noise: Vec<[f32; 3]> = (0..CELLS)
         .map(|_| [(); 3].map(|()| gaussian(rng) * sigma))
         .collect();
-    prepare_noisy(&sample, &noise, frame)
+    prepare_noisy(&sample, (&scanned, &noise), network)
 }
 
-/// `noise` is in cells.
-fn prepare_noisy(sample: &Sample, noise: &[[f32; 3]], frame: FrameKind) -> Option<Prepared> {
+/// `scanned` cells are known without anchors; `noise` is in cells.
+fn prepare_noisy(
+    sample: &Sample,
+    (scanned, noise): (&[bool], &[[f32; 3]]),
+    network: &UnetConfig,
+) -> Option<Prepared> {
     let point = |k: usize| Vector3::from(sample.truth[k]);
     let known = |k: &usize| sample.known[*k];
     let count = (0..CELLS).filter(known).count();
@@ -127,12 +137,16 @@ fn prepare_noisy(sample: &Sample, noise: &[[f32; 3]], frame: FrameKind) -> Optio
             .iter()
             .map(|k| f32::from(u8::from(*k)))
             .collect(),
+        base: None,
     };
-    let frame = Frame::of(frame, &input);
+    let frame = Frame::of(network.frame, &input);
     input
         .positions
         .iter_mut()
         .for_each(|p| *p = frame.enter(*p));
+    if network.input == InputKind::Plate {
+        input.base = Some(plate(&input.positions, scanned)?);
+    }
     let truth = (0..CELLS)
         .map(|k| {
             if sample.valid[k] {
@@ -203,6 +217,10 @@ impl Batch {
                 batch.truth.extend(sample.truth.iter().map(|p| p[axis]));
             }
             batch.known.extend(&sample.input.known);
+            for axis in 0..3 {
+                let base = sample.input.base.as_deref().unwrap_or(&NO_BASE);
+                batch.base.extend(base.iter().map(|p| p[axis]));
+            }
             batch.hole.extend((0..CELLS).map(|k| flag(hole(k))));
             batch.weight.extend((0..CELLS).map(|k| {
                 if hole(k) {
@@ -229,8 +247,8 @@ impl Batch {
 pub struct Recipe {
     /// Draws a sample.
     pub source: Arc<dyn Fn(&mut ChaCha8Rng) -> Sample + Send + Sync>,
-    /// The network's frame.
-    pub frame: FrameKind,
+    /// The network that they are for.
+    pub network: UnetConfig,
     /// Samples in a batch.
     pub size: usize,
     /// Seed of all batches.
@@ -244,7 +262,7 @@ impl Recipe {
         rng.set_stream(index + 1);
         let mut samples = Vec::with_capacity(self.size);
         while samples.len() < self.size {
-            samples.extend(augment(&(self.source)(&mut rng), self.frame, &mut rng));
+            samples.extend(augment(&(self.source)(&mut rng), &self.network, &mut rng));
         }
         Batch::of(&samples)
     }

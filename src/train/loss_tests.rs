@@ -6,7 +6,7 @@ use burn::tensor::{Tensor, TensorData};
 use super::super::batch::{Batch, prepare};
 use super::*;
 use crate::grid::{cell_centre, cell_index};
-use crate::net::FrameKind;
+use crate::net::UnetConfig;
 use crate::scarffolds::samples::Sample;
 
 /// A batch of one flat sheet, all of it known but the given cells.
@@ -20,7 +20,7 @@ fn flat(hole: &[usize]) -> Batch {
         known: open.iter().map(|h| !h).collect(),
         hole: open,
     };
-    Batch::of(&[prepare(&sample, FrameKind::Given).unwrap()])
+    Batch::of(&[prepare(&sample, &UnetConfig::default()).unwrap()])
 }
 
 /// The truth with one cell at another place, given in cells from where cell `over` is.

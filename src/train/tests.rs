@@ -18,6 +18,13 @@ use crate::net::{BackendKind, InputKind, Network};
 
 type B = Autodiff<Flex>;
 
+fn config(frame: FrameKind) -> UnetConfig {
+    UnetConfig {
+        frame,
+        ..UnetConfig::default()
+    }
+}
+
 /// A cylinder of random radius with a square hole.
 fn cylinder(rng: &mut ChaCha8Rng) -> Sample {
     let bend = rng.random_range(1.0..5.0f64);
@@ -75,7 +82,7 @@ fn flat(hole: &[usize]) -> Batch {
         known: hole.iter().map(|h| !h).collect(),
         hole,
     };
-    Batch::of(&[prepare(&sample, FrameKind::Given).unwrap()])
+    Batch::of(&[prepare(&sample, &config(FrameKind::Given)).unwrap()])
 }
 
 #[test]
@@ -121,7 +128,7 @@ fn the_loss_is_what_one_computes_by_hand() {
 #[test]
 fn the_truth_has_no_loss_and_perfect_scores() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let sample = prepare(&cylinder(&mut rng), FrameKind::Canonical).unwrap();
+    let sample = prepare(&cylinder(&mut rng), &config(FrameKind::Canonical)).unwrap();
     let batch = Batch::of(std::slice::from_ref(&sample));
     let device = Default::default();
     let truth = Tensor::<Flex, 4>::from_data(
@@ -150,7 +157,7 @@ fn prepared_samples_are_in_the_networks_units() {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     for _ in 0..20 {
         let sample = cylinder(&mut rng);
-        let Some(prepared) = augment(&sample, FrameKind::Canonical, &mut rng) else {
+        let Some(prepared) = augment(&sample, &config(FrameKind::Canonical), &mut rng) else {
             continue;
         };
         let known = || (0..CELLS).filter(|k| prepared.known[*k]);
@@ -179,7 +186,7 @@ fn prepared_samples_are_in_the_networks_units() {
 fn batches_depend_on_seed_and_index_alone() {
     let recipe = Recipe {
         source: Arc::new(cylinder),
-        frame: FrameKind::Canonical,
+        network: config(FrameKind::Canonical),
         size: 2,
         seed: 3,
     };

@@ -20,7 +20,7 @@ use super::score::{Score, score};
 use super::{Sample, Start, TrainError, TrainOptions};
 use crate::grid::{CELLS, SIDE};
 use crate::net::weights::{self, export};
-use crate::net::{Convolve, InputKind, TrainingCard, Unet, WeightsCard, cells, membrane};
+use crate::net::{Convolve, InputKind, TrainingCard, Unet, UnetConfig, WeightsCard, cells, over};
 
 /// Steps over which the learning rate rises.
 const WARM_UP: u64 = 100;
@@ -91,12 +91,12 @@ where
     let held_out: Vec<Prepared> = sources
         .held_out
         .iter()
-        .filter_map(|s| prepare(s, options.network.frame))
+        .filter_map(|s| prepare(s, &options.network))
         .collect();
     let fill = score(&held_out, &input_fill::<B::InnerBackend>(&held_out));
     let recipe = Recipe {
         source: sources.train,
-        frame: options.network.frame,
+        network: options.network,
         size: options.batch,
         seed: options.seed,
     };
@@ -178,14 +178,26 @@ where
                 path: path.clone(),
                 source,
             })?;
-            let (network, card) = weights::load::<B>(&bytes, device)?;
-            if card.architecture != options.network {
+            let (card, mut tensors) = weights::read(&bytes)?;
+            weights::check(&card, &tensors)?;
+            let same = UnetConfig {
+                input: options.network.input,
+                ..card.architecture
+            };
+            if same != options.network {
                 return Err(TrainError::Options(format!(
                     "{} holds another architecture than the one to train",
                     path.display()
                 )));
             }
-            network
+            if card.architecture != options.network {
+                // What it has learned to see stays of use; what is to be added to another fill is to be learned anew.
+                let last = tensors
+                    .iter_mut()
+                    .filter(|(name, _)| name.starts_with("last."));
+                last.for_each(|(_, (_, values))| values.fill(0.0));
+            }
+            weights::build::<B>(&options.network, &tensors, device)?
         }
     };
     let averaged = network.valid();
@@ -210,19 +222,25 @@ where
     B: AutodiffBackend<InnerBackend: Convolve> + Convolve,
 {
     let device = B::Device::default();
-    let (positions, known) = inputs::<B::InnerBackend>(&batch);
+    let Inputs {
+        positions,
+        known,
+        base,
+    } = Inputs::<B::InnerBackend>::of(&batch);
     // The fill does not depend on the weights: it is computed outside the graph.
     let filled = match options.network.input {
         InputKind::Zeros => positions,
-        InputKind::Membrane => membrane(positions, known.clone()),
+        InputKind::Membrane | InputKind::Plate => over(Some(base), positions, known.clone()),
     };
     let (filled, known) = (
         Tensor::<B, 4>::from_inner(filled),
         Tensor::from_inner(known),
     );
     let predicted = match options.network.input {
-        InputKind::Zeros => state.network.predict(InputKind::Zeros, filled, known),
-        InputKind::Membrane => state.network.residual(filled.clone(), known) + filled,
+        InputKind::Zeros => state.network.predict(InputKind::Zeros, filled, known, None),
+        InputKind::Membrane | InputKind::Plate => {
+            state.network.residual(filled.clone(), known) + filled
+        }
     };
     let target = Target::of(batch, &device);
     let Loss {
@@ -254,16 +272,31 @@ fn number<B: Backend>(x: &Tensor<B, 1>) -> f32 {
         .unwrap_or(f32::NAN)
 }
 
-/// Positions `[count, 3, 64, 64]` and known flags `[count, 1, 64, 64]` of a batch.
-fn inputs<B: Backend>(batch: &Batch) -> (Tensor<B, 4>, Tensor<B, 4>) {
-    let device = B::Device::default();
-    let tensor = |values: &[f32], channels: usize| {
-        Tensor::from_data(
-            TensorData::new(values.to_vec(), [batch.count, channels, SIDE, SIDE]),
-            &device,
-        )
-    };
-    (tensor(&batch.positions, 3), tensor(&batch.known, 1))
+/// What a batch shows the network.
+struct Inputs<B: Backend> {
+    /// `[count, 3, 64, 64]`.
+    positions: Tensor<B, 4>,
+    /// `[count, 1, 64, 64]`.
+    known: Tensor<B, 4>,
+    /// `[count, 3, 64, 64]`.
+    base: Tensor<B, 4>,
+}
+
+impl<B: Backend> Inputs<B> {
+    fn of(batch: &Batch) -> Self {
+        let device = B::Device::default();
+        let tensor = |values: &[f32], channels: usize| {
+            Tensor::from_data(
+                TensorData::new(values.to_vec(), [batch.count, channels, SIDE, SIDE]),
+                &device,
+            )
+        };
+        Inputs {
+            positions: tensor(&batch.positions, 3),
+            known: tensor(&batch.known, 1),
+            base: tensor(&batch.base, 3),
+        }
+    }
 }
 
 /// The network's answer for prepared samples, in their own frame.
@@ -272,23 +305,24 @@ fn predictions<B: Convolve>(
     input: InputKind,
     samples: &[Prepared],
 ) -> Vec<Vec<[f32; 3]>> {
-    answers(samples, |positions, known| {
-        network.predict(input, positions, known)
+    answers(samples, |x: Inputs<B>| {
+        network.predict(input, x.positions, x.known, Some(x.base))
     })
 }
 
-/// The membrane alone, for comparison.
+/// The fill alone, for comparison.
 fn input_fill<B: Backend>(samples: &[Prepared]) -> Vec<Vec<[f32; 3]>> {
-    answers(samples, membrane::<B>)
+    answers(samples, |x: Inputs<B>| {
+        over(Some(x.base), x.positions, x.known)
+    })
 }
 
 fn answers<B: Backend>(
     samples: &[Prepared],
-    answer: impl Fn(Tensor<B, 4>, Tensor<B, 4>) -> Tensor<B, 4>,
+    answer: impl Fn(Inputs<B>) -> Tensor<B, 4>,
 ) -> Vec<Vec<[f32; 3]>> {
     let chunks = samples.chunks(8).flat_map(|chunk| {
-        let (positions, known) = inputs::<B>(&Batch::of(chunk));
-        let planes: Vec<f32> = answer(positions, known)
+        let planes: Vec<f32> = answer(Inputs::of(&Batch::of(chunk)))
             .into_data()
             .convert::<f32>()
             .into_vec()

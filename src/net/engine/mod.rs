@@ -19,6 +19,7 @@ pub(super) mod reference;
 #[cfg(test)]
 mod tests;
 
+use std::ops::Range;
 use std::sync::OnceLock;
 
 use crate::grid::CELLS;
@@ -94,6 +95,17 @@ pub struct Engine {
 /// the derivatives `[3, 64, 64]`. Called once a grid, on any thread.
 pub type Cotangent<'a> = dyn Fn(usize, &[f32], &mut [f32]) + Sync + 'a;
 
+/// What some grids show the network.
+#[derive(Debug, Clone, Copy)]
+pub struct Input<'a> {
+    /// `[n, 3, 64, 64]`.
+    pub positions: &'a [f32],
+    /// `[n, 1, 64, 64]` in 0..=1.
+    pub known: &'a [f32],
+    /// `[n, 3, 64, 64]`, for [`InputKind::Plate`](crate::net::InputKind); zero where there is none.
+    pub base: Option<&'a [f32]>,
+}
+
 /// Gradients of a prediction's planes times a cotangent, and the prediction.
 pub struct Gradient<'a> {
     /// `[n, 3, 64, 64]`.
@@ -140,28 +152,20 @@ impl Engine {
 
     /// Predicts all cells of some grids, in the network's units: what `Unet::predict` does.
     ///
-    /// `positions [n, 3, 64, 64]`, `known [n, 1, 64, 64]` in 0..=1 `-> out [n, 3, 64, 64]`. A grid's answer is the same to the bit in any
-    /// company and on any number of threads. Allocates only when the scratch has not seen as many grids before.
+    /// `out [n, 3, 64, 64]`. A grid's answer is the same to the bit in any company and on any number of threads. Allocates only when the
+    /// scratch has not seen as many grids before.
     ///
     /// # Errors
     /// Slices whose lengths are not those of the same number of grids.
     pub fn predict(
         &self,
         scratch: &mut Scratch,
-        positions: &[f32],
-        known: &[f32],
+        input: Input,
         out: &mut [f32],
     ) -> Result<(), EngineError> {
-        let images = known.len() / CELLS;
-        check(
-            images,
-            [
-                ("known", known.len(), 1),
-                ("positions", positions.len(), 3),
-                ("out", out.len(), 3),
-            ],
-        )?;
-        scratch.predict(self, images, (positions, known), out);
+        input.check()?;
+        check(input.images(), [("out", out.len(), 3)])?;
+        scratch.predict(self, input, out);
         Ok(())
     }
 
@@ -174,28 +178,55 @@ impl Engine {
     pub fn gradient(
         &self,
         scratch: &mut Scratch,
-        (positions, known): (&[f32], &[f32]),
+        input: Input,
         cotangent: &Cotangent,
         out: Gradient,
     ) -> Result<(), EngineError> {
-        let images = known.len() / CELLS;
+        input.check()?;
         check(
-            images,
+            input.images(),
             [
-                ("known", known.len(), 1),
-                ("positions", positions.len(), 3),
                 ("prediction", out.prediction.len(), 3),
                 ("by_positions", out.by_positions.len(), 3),
                 ("by_known", out.by_known.len(), 1),
             ],
         )?;
-        scratch.gradient(self, images, (positions, known), cotangent, out);
+        scratch.gradient(self, input, cotangent, out);
         Ok(())
     }
 
     /// The adjoint layers, prepared when first wanted.
     fn reverse(&self) -> &Reverse {
         self.reverse.get_or_init(|| Reverse::pack(&self.folds))
+    }
+}
+
+impl<'a> Input<'a> {
+    /// How many grids there are.
+    fn images(&self) -> usize {
+        self.known.len() / CELLS
+    }
+
+    fn check(&self) -> Result<(), EngineError> {
+        let base = self.base.map_or(self.positions.len(), <[f32]>::len);
+        check(
+            self.images(),
+            [
+                ("known", self.known.len(), 1),
+                ("positions", self.positions.len(), 3),
+                ("base", base, 3),
+            ],
+        )
+    }
+
+    /// Some of the grids.
+    fn part(&self, images: Range<usize>) -> Input<'a> {
+        let three = images.start * 3 * CELLS..images.end * 3 * CELLS;
+        Input {
+            positions: &self.positions[three.clone()],
+            known: &self.known[images.start * CELLS..images.end * CELLS],
+            base: self.base.map(|base| &base[three]),
+        }
     }
 }
 

@@ -159,9 +159,15 @@ impl Reference<'_> {
         self.conv("last", x)
     }
 
-    /// `Unet::predict` of one grid: three planes and a mask to three planes.
+    /// `Unet::predict` of one grid without a base: three planes and a mask to three planes.
     pub fn predict(&self, positions: &[f64], known: &[f64]) -> Vec<f64> {
-        let given = |axis: usize| positions[axis * CELLS..][..CELLS].to_vec();
+        self.predict_over(&vec![0.0; positions.len()], positions, known)
+    }
+
+    /// `Unet::predict` of one grid: two times three planes and a mask to three planes.
+    pub fn predict_over(&self, base: &[f64], positions: &[f64], known: &[f64]) -> Vec<f64> {
+        let off: Vec<f64> = positions.iter().zip(base).map(|(x, b)| x - b).collect();
+        let given = |axis: usize| off[axis * CELLS..][..CELLS].to_vec();
         let mask = Planes {
             side: SIDE,
             planes: vec![known.to_vec()],
@@ -170,9 +176,13 @@ impl Reference<'_> {
             side: SIDE,
             planes: (0..3).map(given).collect(),
         };
-        for plane in &mut filled.planes {
+        for (axis, plane) in filled.planes.iter_mut().enumerate() {
             match self.config.input {
-                InputKind::Membrane => *plane = membrane(plane, known, 0),
+                InputKind::Membrane | InputKind::Plate => {
+                    let over = membrane(plane, known, 0);
+                    let base = &base[axis * CELLS..][..CELLS];
+                    *plane = over.iter().zip(base).map(|(x, b)| x + b).collect();
+                }
                 InputKind::Zeros => plane.iter_mut().zip(known).for_each(|(x, k)| *x *= k),
             }
         }
@@ -181,7 +191,7 @@ impl Reference<'_> {
             .forward(x.concat(mask))
             .map(|x| x * f64::from(OUTPUT_SCALE));
         let y = match self.config.input {
-            InputKind::Membrane => y.add(&filled),
+            InputKind::Membrane | InputKind::Plate => y.add(&filled),
             InputKind::Zeros => y,
         };
         y.planes.concat()

@@ -7,7 +7,7 @@ use super::forward::{Activations, Saved};
 use super::map::Map;
 use super::membrane::{Pyramid, adjoint, membrane};
 use super::simd::{Block, Kernel, LANES, Simd};
-use super::{Cotangent, Engine, Gradient};
+use super::{Cotangent, Engine, Gradient, Input};
 use crate::grid::{CELLS, SIDE};
 use crate::net::InputKind;
 use crate::net::unet::{INPUT_SCALE, OUTPUT_SCALE};
@@ -29,115 +29,77 @@ struct Lane {
     pyramid: Pyramid,
     /// Planes of one grid.
     planes: Vec<f32>,
+    /// Planes of one grid's distance from its base.
+    off: Vec<f32>,
     /// By the prediction's planes, grid after grid.
     cotangents: Vec<f32>,
 }
 
-/// Some grids of a call of [`Engine::predict`].
-struct Grids<'a> {
-    positions: &'a [f32],
-    known: &'a [f32],
-    out: &'a mut [f32],
-}
-
 impl Scratch {
-    pub(super) fn predict(
-        &mut self,
-        engine: &Engine,
-        images: usize,
-        (positions, known): (&[f32], &[f32]),
-        out: &mut [f32],
-    ) {
-        let share = self.share(engine, images);
-        let work = |lane: &mut Lane, grids: Grids| {
-            let parts = grids.positions.chunks(TOGETHER * 3 * CELLS);
-            let parts = parts.zip(grids.known.chunks(TOGETHER * CELLS));
-            for ((positions, known), out) in parts.zip(grids.out.chunks_mut(TOGETHER * 3 * CELLS)) {
-                lane.predict(
-                    engine,
-                    Grids {
-                        positions,
-                        known,
-                        out,
-                    },
-                );
+    pub(super) fn predict(&mut self, engine: &Engine, input: Input, out: &mut [f32]) {
+        let share = self.share(engine, input.images());
+        let work = |lane: &mut Lane, first: usize, out: &mut [f32]| {
+            let numbered = (first..).step_by(TOGETHER);
+            for (first, out) in numbered.zip(out.chunks_mut(TOGETHER * 3 * CELLS)) {
+                let images = first..first + out.len() / (3 * CELLS);
+                lane.predict(engine, input.part(images), out);
             }
         };
-        if share >= images {
+        if share >= input.images() {
             if let Some(lane) = self.lanes.first_mut() {
-                work(
-                    lane,
-                    Grids {
-                        positions,
-                        known,
-                        out,
-                    },
-                );
+                work(lane, 0, out);
             }
             return;
         }
-        self.lanes
-            .par_iter_mut()
-            .zip(positions.par_chunks(share * 3 * CELLS))
-            .zip(known.par_chunks(share * CELLS))
+        let lanes = self.lanes.par_iter_mut().enumerate();
+        lanes
             .zip(out.par_chunks_mut(share * 3 * CELLS))
-            .for_each(|(((lane, positions), known), out)| {
-                work(
-                    lane,
-                    Grids {
-                        positions,
-                        known,
-                        out,
-                    },
-                );
-            });
+            .for_each(|((place, lane), out)| work(lane, place * share, out));
     }
 
     pub(super) fn gradient(
         &mut self,
         engine: &Engine,
-        images: usize,
-        (positions, known): (&[f32], &[f32]),
+        input: Input,
         cotangent: &Cotangent,
         out: Gradient,
     ) {
-        let share = self.share(engine, images);
-        let work = |lane: &mut Lane, first: usize, x: (&[f32], &[f32]), out: Gradient| {
-            let parts = (x.0.chunks(TOGETHER * 3 * CELLS)).zip(x.1.chunks(TOGETHER * CELLS));
+        let share = self.share(engine, input.images());
+        let work = |lane: &mut Lane, first: usize, out: Gradient| {
             let outs = (out.prediction.chunks_mut(TOGETHER * 3 * CELLS))
                 .zip(out.by_positions.chunks_mut(TOGETHER * 3 * CELLS))
                 .zip(out.by_known.chunks_mut(TOGETHER * CELLS));
-            let numbered = (first..).step_by(TOGETHER).zip(parts.zip(outs));
-            for (first, (x, ((prediction, by_positions), by_known))) in numbered {
+            let numbered = (first..).step_by(TOGETHER);
+            for (first, ((prediction, by_positions), by_known)) in numbered.zip(outs) {
+                let images = first..first + by_known.len() / CELLS;
                 let out = Gradient {
                     prediction,
                     by_positions,
                     by_known,
                 };
-                lane.gradient(engine, x, (first, cotangent), out);
+                lane.gradient(engine, input.part(images), (first, cotangent), out);
             }
         };
-        if share >= images {
+        if share >= input.images() {
             if let Some(lane) = self.lanes.first_mut() {
-                work(lane, 0, (positions, known), out);
+                work(lane, 0, out);
             }
             return;
         }
-        let x = (positions.par_chunks(share * 3 * CELLS)).zip(known.par_chunks(share * CELLS));
-        let out = (out.prediction.par_chunks_mut(share * 3 * CELLS))
+        let outs = (out.prediction.par_chunks_mut(share * 3 * CELLS))
             .zip(out.by_positions.par_chunks_mut(share * 3 * CELLS))
             .zip(out.by_known.par_chunks_mut(share * CELLS));
         let lanes = self.lanes.par_iter_mut().enumerate();
-        lanes.zip(x).zip(out).for_each(
-            |(((place, lane), x), ((prediction, by_positions), by_known))| {
+        lanes
+            .zip(outs)
+            .for_each(|((place, lane), ((prediction, by_positions), by_known))| {
                 let out = Gradient {
                     prediction,
                     by_positions,
                     by_known,
                 };
-                work(lane, place * share, x, out);
-            },
-        );
+                work(lane, place * share, out);
+            });
     }
 
     /// Grids a thread takes; makes sure that there are lanes for all.
@@ -153,15 +115,15 @@ impl Scratch {
 
 impl Lane {
     /// Predicts at most [`TOGETHER`] grids.
-    fn predict(&mut self, engine: &Engine, grids: Grids) {
-        let images = grids.known.len() / CELLS;
+    fn predict(&mut self, engine: &Engine, input: Input, all: &mut [f32]) {
+        let images = input.images();
         let (target, network) = (engine.target, &engine.forward);
         let room = Lane::room(&mut self.forward, engine, images);
         for image in 0..images {
-            let (x, known) = (image3(grids.positions, image), image1(grids.known, image));
-            let out = image3_mut(grids.out, image);
-            enter(engine, &mut self.pyramid, (x, known), out);
-            lay_out((out, known), image, &mut room.input);
+            let grid = input.part(image..image + 1);
+            let out = image3_mut(all, image);
+            enter(engine, (&mut self.pyramid, &mut self.off), grid, out);
+            lay_out((out, grid.known), image, &mut room.input);
         }
         let features = room.run(target, images, network, None);
         for image in 0..images {
@@ -169,7 +131,7 @@ impl Lane {
                 engine,
                 features,
                 image,
-                out: image3_mut(grids.out, image),
+                out: image3_mut(all, image),
             });
         }
     }
@@ -178,11 +140,11 @@ impl Lane {
     fn gradient(
         &mut self,
         engine: &Engine,
-        (positions, known): (&[f32], &[f32]),
+        input: Input,
         (first, cotangent): (usize, &Cotangent),
         out: Gradient,
     ) {
-        let images = known.len() / CELLS;
+        let images = input.images();
         let (target, network, reverse) = (engine.target, &engine.forward, engine.reverse());
         let room = Lane::room(&mut self.forward, engine, images);
         let fits = |(_, gradients): &(Saved, Gradients)| gradients.images() >= images;
@@ -196,10 +158,10 @@ impl Lane {
             return;
         };
         for image in 0..images {
-            let (x, known) = (image3(positions, image), image1(known, image));
+            let grid = input.part(image..image + 1);
             let filled = image3_mut(out.prediction, image);
-            enter(engine, &mut self.pyramid, (x, known), filled);
-            lay_out((filled, known), image, &mut room.input);
+            enter(engine, (&mut self.pyramid, &mut self.off), grid, filled);
+            lay_out((filled, grid.known), image, &mut room.input);
         }
         let features = room.run(target, images, network, Some(saved));
         for image in 0..images {
@@ -221,7 +183,7 @@ impl Lane {
         }
         gradients.run(target, images, (network, reverse), (room, saved));
         for image in 0..images {
-            let (x, known) = (image3(positions, image), image1(known, image));
+            let grid = input.part(image..image + 1);
             let by_positions = image3_mut(out.by_positions, image);
             let by_known = &mut out.by_known[image * CELLS..][..CELLS];
             by_positions.fill(0.0);
@@ -229,17 +191,18 @@ impl Lane {
             match engine.config.input {
                 InputKind::Zeros => {
                     for (at, by) in self.planes.iter().enumerate() {
-                        by_positions[at] = by * known[at % CELLS];
-                        by_known[at % CELLS] += by * x[at];
+                        by_positions[at] = by * grid.known[at % CELLS];
+                        by_known[at % CELLS] += by * grid.positions[at];
                     }
                 }
-                InputKind::Membrane => {
+                InputKind::Membrane | InputKind::Plate => {
                     for (by, direct) in self.planes.iter_mut().zip(image3(&self.cotangents, image))
                     {
                         *by += direct;
                     }
                     let by = (by_positions, by_known);
-                    adjoint(target, &mut self.pyramid, (x, known), &self.planes, by);
+                    let x = (off_base(grid, &mut self.off), grid.known);
+                    adjoint(target, &mut self.pyramid, x, &self.planes, by);
                 }
             }
         }
@@ -264,25 +227,37 @@ fn image3_mut(planes: &mut [f32], image: usize) -> &mut [f32] {
     &mut planes[image * 3 * CELLS..][..3 * CELLS]
 }
 
-fn image1(planes: &[f32], image: usize) -> &[f32] {
-    &planes[image * CELLS..][..CELLS]
-}
-
 /// One grid's positions as the network sees them, but for their scale.
 fn enter(
     engine: &Engine,
-    pyramid: &mut Pyramid,
-    (positions, known): (&[f32], &[f32]),
+    (pyramid, off): (&mut Pyramid, &mut Vec<f32>),
+    grid: Input,
     filled: &mut [f32],
 ) {
     match engine.config.input {
-        InputKind::Membrane => membrane(engine.target, pyramid, (positions, known), filled),
+        InputKind::Membrane | InputKind::Plate => {
+            let x = (off_base(grid, off), grid.known);
+            membrane(engine.target, pyramid, x, filled);
+            for (to, base) in filled.iter_mut().zip(grid.base.unwrap_or_default()) {
+                *to += base;
+            }
+        }
         InputKind::Zeros => {
             for (at, to) in filled.iter_mut().enumerate() {
-                *to = positions[at] * known[at % CELLS];
+                *to = grid.positions[at] * grid.known[at % CELLS];
             }
         }
     }
+}
+
+/// How far a grid's positions are from its base, where it has one; in `off`, or the positions themselves.
+fn off_base<'a>(grid: Input<'a>, off: &'a mut Vec<f32>) -> &'a [f32] {
+    let Some(base) = grid.base else {
+        return grid.positions;
+    };
+    off.clear();
+    off.extend(grid.positions.iter().zip(base).map(|(x, base)| x - base));
+    off
 }
 
 /// Three planes, scaled, and the mask as the channels of one panel.
@@ -339,7 +314,7 @@ impl Kernel for Last<'_> {
                     s.store(sum, &mut block);
                     let x = (block.sum() + folds.last_bias[axis]) * OUTPUT_SCALE;
                     *out = match self.engine.config.input {
-                        InputKind::Membrane => *out + x,
+                        InputKind::Membrane | InputKind::Plate => *out + x,
                         InputKind::Zeros => x,
                     };
                 }

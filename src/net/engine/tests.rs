@@ -136,6 +136,14 @@ fn grids(count: usize) -> (Vec<f32>, Vec<f32>) {
     (positions, known)
 }
 
+fn input<'a>(positions: &'a [f32], known: &'a [f32]) -> Input<'a> {
+    Input {
+        positions,
+        known,
+        base: None,
+    }
+}
+
 fn wide(x: &[f32]) -> Vec<f64> {
     x.iter().map(|x| f64::from(*x)).collect()
 }
@@ -158,7 +166,9 @@ fn predict(
     (positions, known): (&[f32], &[f32]),
 ) -> Vec<f32> {
     let mut out = vec![f32::NAN; positions.len()];
-    engine.predict(scratch, positions, known, &mut out).unwrap();
+    engine
+        .predict(scratch, input(positions, known), &mut out)
+        .unwrap();
     out
 }
 
@@ -180,7 +190,7 @@ fn gradient(
         to.copy_from_slice(&cotangent[grid * 3 * CELLS..][..3 * CELLS]);
     };
     engine
-        .gradient(scratch, (positions, known), &given, room)
+        .gradient(scratch, input(positions, known), &given, room)
         .unwrap();
     out
 }
@@ -382,7 +392,7 @@ fn what_is_wrong_has_a_name() {
     let engine = engine(&tensors(2), config(2, InputKind::Zeros), Isa::Portable, 1);
     let (positions, known) = grids(1);
     let mut out = vec![0.0; 5];
-    let short = engine.predict(&mut Scratch::default(), &positions, &known, &mut out);
+    let short = engine.predict(&mut Scratch::default(), input(&positions, &known), &mut out);
     assert!(short.unwrap_err().to_string().contains("`out`"));
 }
 

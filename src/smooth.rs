@@ -1,10 +1,15 @@
-//! The smooth fills that a learned one has to beat: a membrane and a thin plate over the hole, each the exact minimum of its energy.
+//! Smooth fills of the grid, each the exact minimum of its energy: what a network sees in unknown cells, and what it has to beat.
+//! Fills are linear in the known positions, the same under the grid's symmetries, and turn with the cloth.
+//! Knows grids and the sparse factor; no cloth, no network.
 
 use serde::Serialize;
 
 use crate::flatten::cholesky::{NotPositive, Symmetric};
-use crate::grid::{CELLS, Grid, SIDE, neighbour_pairs};
+use crate::grid::{CELLS, SIDE, neighbour_pairs};
 use crate::mesh::Vec3;
+
+/// Membrane beside the plate of [`Smooth::TautPlate`]: it takes over at lengths above 1 / √this, in cells.
+const TENSION: f64 = 1.0 / (15.0 * 15.0);
 
 /// An energy of the grid, each coordinate by itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -14,16 +19,23 @@ pub enum Smooth {
     Membrane,
     /// Σ x_uu² + 2 x_uv² + x_vv² of second differences: the discrete biharmonic fill, smooth across the rim.
     ThinPlate,
+    /// A thin plate under a little tension: smooth across the rim, and tame where it runs on beyond all known cells.
+    TautPlate,
 }
 
 /// A difference of cells: Σ coefficient · position.
 type Difference = Vec<(usize, f64)>;
 
-/// The grid with its hole filled to the least energy; cells neither known nor in the hole keep what they hold.
+/// Positions with the hole filled to the least energy; cells neither known nor in the hole keep what they hold.
 ///
 /// Differences that reach a cell neither known nor in the hole are left out. One sparse Cholesky factor, three right-hand sides.
 /// `None` when the known cells do not determine the fill.
-pub fn smooth(grid: &Grid, hole: &[bool], energy: Smooth) -> Option<Vec<Vec3>> {
+pub fn smooth(
+    positions: &[Vec3],
+    known: &[bool],
+    hole: &[bool],
+    energy: Smooth,
+) -> Option<Vec<Vec3>> {
     let mut unknown = vec![usize::MAX; CELLS];
     let open: Vec<usize> = (0..CELLS).filter(|&k| hole[k]).collect();
     for (place, &cell) in open.iter().enumerate() {
@@ -31,7 +43,7 @@ pub fn smooth(grid: &Grid, hole: &[bool], energy: Smooth) -> Option<Vec<Vec3>> {
     }
     let mut system = Symmetric::zero(open.len());
     let mut rhs = vec![[0.0; 3]; open.len()];
-    let present = |k: usize| hole[k] || grid.known[k];
+    let present = |k: usize| hole[k] || known[k];
     for (weight, row) in differences(energy) {
         let counts = row.iter().all(|&(k, _)| present(k)) && row.iter().any(|&(k, _)| hole[k]);
         if !counts {
@@ -39,7 +51,7 @@ pub fn smooth(grid: &Grid, hole: &[bool], energy: Smooth) -> Option<Vec<Vec3>> {
         }
         let (free, given): (Difference, Difference) = row.iter().partition(|&&(k, _)| hole[k]);
         let free: Difference = free.iter().map(|&(k, c)| (unknown[k], c)).collect();
-        let constant: Vec3 = given.iter().map(|&(k, c)| grid.positions[k] * c).sum();
+        let constant: Vec3 = given.iter().map(|&(k, c)| positions[k] * c).sum();
         system.add_square(&free, weight);
         for &(place, c) in &free {
             for axis in 0..3 {
@@ -48,7 +60,7 @@ pub fn smooth(grid: &Grid, hole: &[bool], energy: Smooth) -> Option<Vec<Vec3>> {
         }
     }
     solved(&system, &mut rhs).ok()?;
-    let mut filled = grid.positions.clone();
+    let mut filled = positions.to_vec();
     for (&cell, p) in open.iter().zip(&rhs) {
         filled[cell] = Vec3::from(*p);
     }
@@ -64,11 +76,13 @@ fn solved(system: &Symmetric, rhs: &mut [[f64; 3]]) -> Result<(), NotPositive> {
 
 /// All differences of an energy on the whole grid, with their weights.
 fn differences(energy: Smooth) -> Vec<(f64, Difference)> {
+    let stretches =
+        |weight: f64| neighbour_pairs().map(move |(a, b)| (weight, vec![(a, -1.0), (b, 1.0)]));
+    let bendings = || (0..CELLS).flat_map(bendings);
     match energy {
-        Smooth::Membrane => neighbour_pairs()
-            .map(|(a, b)| (1.0, vec![(a, -1.0), (b, 1.0)]))
-            .collect(),
-        Smooth::ThinPlate => (0..CELLS).flat_map(bendings).collect(),
+        Smooth::Membrane => stretches(1.0).collect(),
+        Smooth::ThinPlate => bendings().collect(),
+        Smooth::TautPlate => bendings().chain(stretches(TENSION)).collect(),
     }
 }
 
@@ -88,4 +102,36 @@ fn bendings(k: usize) -> impl Iterator<Item = (f64, Difference)> {
         (2.0, corners)
     });
     [along_u, along_v, mixed].into_iter().flatten()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::cell_centre;
+
+    /// A surface with a round hole in its middle and nothing known in the grid's corner.
+    fn holed(surface: impl Fn(f64, f64) -> Vec3) -> (Vec<Vec3>, Vec<bool>) {
+        let uv = || (0..CELLS).map(cell_centre);
+        let known =
+            uv().map(|p| (p - crate::mesh::Vec2::repeat(0.5)).norm() > 0.2 && p.sum() > 0.2);
+        (uv().map(|p| surface(p.x, p.y)).collect(), known.collect())
+    }
+
+    fn worst(surface: impl Fn(f64, f64) -> Vec3, energy: Smooth) -> f64 {
+        let (truth, known) = holed(surface);
+        let open: Vec<bool> = known.iter().map(|k| !k).collect();
+        let filled = smooth(&truth, &known, &open, energy).unwrap();
+        let away = truth.iter().zip(&filled).map(|(a, b)| (a - b).norm());
+        away.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_taut_plate_bends_nearly_as_a_plate_does() {
+        let bent = |u: f64, v: f64| Vec3::new(u, v, (u - 0.5).powi(2) - 0.5 * v * v);
+        let [membrane, taut] =
+            [Smooth::Membrane, Smooth::TautPlate].map(|energy| worst(bent, energy));
+        assert!(taut < 0.3 * membrane, "{taut} {membrane}");
+        let wave = |u: f64, v: f64| Vec3::new(u, v, 0.1 * (6.0 * u).sin() * (5.0 * v).cos());
+        assert!(worst(wave, Smooth::TautPlate) < 0.5 * worst(wave, Smooth::Membrane));
+    }
 }
