@@ -44,6 +44,9 @@ pub struct Args {
     /// Compare the holes of training samples with those of flattened scans instead
     #[arg(long, conflicts_with_all = ["noise", "picture", "upright", "scans"])]
     masks: bool,
+    /// Ask the network once a grid, not for all of its eight symmetries
+    #[arg(long)]
+    once: bool,
     #[command(flatten)]
     network: NetworkArgs,
 }
@@ -66,7 +69,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mender = args.network.mender()?;
     let network = mender.networks.default();
     let fill = |grids: &[NormalGrid]| {
-        let filled = network.fill(grids);
+        let filled = match args.once {
+            true => network.fill(grids),
+            false => network.fill_averaged(grids),
+        };
         filled.map_err(|error| EvaluateError::Filler(Box::new(error)))
     };
     let plan = Plan {

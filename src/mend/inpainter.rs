@@ -90,11 +90,11 @@ impl<'a> Inpainter<'a> {
     /// Predicts every cell of every grid, in the network's units.
     pub fn fill(&self, grids: &[NormalGrid]) -> Result<Vec<Vec<[f32; 3]>>, NetError> {
         let Some(turn) = &self.turn else {
-            return self.network.fill(grids);
+            return self.network.fill_averaged(grids);
         };
         let turned: Vec<NormalGrid> = grids.iter().map(|g| self.turned(g)).collect();
         let back = turn.transpose();
-        let mut answers = self.network.fill(&turned)?;
+        let mut answers = self.network.fill_averaged(&turned)?;
         for p in answers.iter_mut().flatten() {
             *p = times(&back, *p);
         }

@@ -11,6 +11,7 @@ mod networks;
 mod norm;
 mod shared;
 mod slope;
+pub mod symmetry;
 mod unet;
 pub mod weights;
 

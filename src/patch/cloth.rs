@@ -20,7 +20,7 @@ pub struct Elastics {
     pub strain: f64,
     /// Bending length: bends of a radius well above it cost less than strain.
     pub bending: f64,
-    /// Share of the network's own curvature that counts as unbent.
+    /// Share of the network's own curvature that counts as unbent; at the rim none does, so that the scan's own folds go on.
     pub rest_curvature: f64,
     /// Tether to the network's positions: the distance at which it pulls as much as a strain of 1, in mean edges.
     pub tether: f64,
@@ -35,8 +35,8 @@ impl Default for Elastics {
         Elastics {
             strain: 0.002,
             bending: 0.25,
-            rest_curvature: 0.25,
-            tether: 100.0,
+            rest_curvature: 1.0,
+            tether: 30.0,
             rounds: 300,
             still: 1e-4,
         }

@@ -8,7 +8,8 @@ use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::grid::{CELLS, NormalGrid, SIDE, cell_index, neighbour_pairs};
+use crate::grid::{CELLS, NormalGrid, SIDE, neighbour_pairs};
+use crate::net::symmetry::origins;
 use crate::net::{Frame, FrameKind, InputKind, UnetConfig, plate};
 use crate::scarffolds::samples::Sample;
 
@@ -165,24 +166,9 @@ fn prepare_noisy(
     })
 }
 
-/// The sample under one of the grid's symmetries: bit 0 flips u, bit 1 flips v, bit 2 swaps them.
+/// The sample under one of the grid's symmetries.
 fn symmetric(sample: &Sample, symmetry: usize) -> Sample {
-    let from: Vec<usize> = (0..CELLS)
-        .map(|k| {
-            let (mut i, mut j) = (k % SIDE, k / SIDE);
-            if symmetry & 1 != 0 {
-                i = SIDE - 1 - i;
-            }
-            if symmetry & 2 != 0 {
-                j = SIDE - 1 - j;
-            }
-            if symmetry & 4 != 0 {
-                cell_index(j, i)
-            } else {
-                cell_index(i, j)
-            }
-        })
-        .collect();
+    let from = origins(symmetry);
     Sample {
         truth: from.iter().map(|k| sample.truth[*k]).collect(),
         valid: from.iter().map(|k| sample.valid[*k]).collect(),
