@@ -15,8 +15,8 @@ use darn::mesh::{Vec2, Vec3};
 use darn::net::{BackendKind, Network, Networks};
 use darn::scan::export::{Fresh, glb};
 use darn::scan::{self, Scan};
-use darn::scarffolds::sheets;
 use darn::scarffolds::scanned::{Hole, scanned};
+use darn::scarffolds::sheets;
 use darn::scarffolds::sheets::Sheet;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -119,7 +119,10 @@ impl Case {
     ) -> Option<Case> {
         let mesh = scanned(sheet, 45, hole, rng).mesh;
         let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| p.cast().into()).collect();
-        let normals: Vec<[f32; 3]> = vertex_normals(&mesh).iter().map(|n| n.cast().into()).collect();
+        let normals: Vec<[f32; 3]> = vertex_normals(&mesh)
+            .iter()
+            .map(|n| n.cast().into())
+            .collect();
         let fresh = Fresh {
             name: "sheet",
             positions: &positions,
@@ -157,9 +160,13 @@ impl Case {
     fn vertex(&self, rng: &mut ChaCha8Rng) -> usize {
         let depth = |v: usize| {
             let each = self.uvs[..self.rim].iter();
-            each.map(|r| (r - self.uvs[v]).norm()).fold(f64::MAX, f64::min) * 64.0
+            each.map(|r| (r - self.uvs[v]).norm())
+                .fold(f64::MAX, f64::min)
+                * 64.0
         };
-        let deep: Vec<usize> = (self.rim..self.uvs.len()).filter(|v| depth(*v) >= 3.0).collect();
+        let deep: Vec<usize> = (self.rim..self.uvs.len())
+            .filter(|v| depth(*v) >= 3.0)
+            .collect();
         match deep.as_slice() {
             [] => (self.rim..self.uvs.len())
                 .max_by(|a, b| depth(*a).total_cmp(&depth(*b)))
@@ -178,7 +185,11 @@ impl Case {
     }
 
     /// Distance to the anchor and how much of it is beyond reach, in cells; the largest stretch.
-    fn kept(&self, vertex: usize, by: Vec3) -> Result<([f64; 3], Vec<Vec3>), darn::mend::MendError> {
+    fn kept(
+        &self,
+        vertex: usize,
+        by: Vec3,
+    ) -> Result<([f64; 3], Vec<Vec3>), darn::mend::MendError> {
         let asked = anchored(vec![self.anchor(vertex, by)]);
         let (mut positions, report) = self.session.positions(&asked)?;
         let hole = &report.holes[0];
@@ -206,7 +217,10 @@ impl Case {
         let off = self.kept(vertex, direction(rng) * 2.0 * self.cell)?.0;
         let across = self.kept(vertex, normal * 2.0 * self.cell)?.0;
         let (far, moved) = self.kept(vertex, direction(rng) * 10.0 * self.extent)?;
-        let most = moved.iter().zip(&self.positions).map(|(a, b)| (a - b).norm());
+        let most = moved
+            .iter()
+            .zip(&self.positions)
+            .map(|(a, b)| (a - b).norm());
         let absurd = [stretch, far[2], most.fold(0.0, f64::max) / self.extent];
 
         let started = Instant::now();
@@ -296,15 +310,24 @@ fn print(rows: &[Row]) {
         println!("| {name} | {:.3} | {:.3} |", at(&each, 0.5), at(&each, 0.9));
     };
     line("on the unedited cloth: change, cells RMS", &|r| r.still);
-    println!("| … below 0.1 cell | {:.0} % | |", share(&|r| r.still < 0.1));
+    println!(
+        "| … below 0.1 cell | {:.0} % | |",
+        share(&|r| r.still < 0.1)
+    );
     for (name, of) in [
-        ("2 cells off, any direction", (|r: &Row| r.off) as fn(&Row) -> [f64; 3]),
+        (
+            "2 cells off, any direction",
+            (|r: &Row| r.off) as fn(&Row) -> [f64; 3],
+        ),
         ("2 cells off, across the cloth", |r: &Row| r.across),
     ] {
         line(&format!("{name}: distance kept, cells"), &|r| of(r)[0]);
         line("… of it beyond reach", &|r| of(r)[1]);
         line("… largest stretch of an edge", &|r| of(r)[2]);
-        println!("| … within 0.5 cell | {:.0} % | |", share(&|r| of(r)[0] <= 0.5));
+        println!(
+            "| … within 0.5 cell | {:.0} % | |",
+            share(&|r| of(r)[0] <= 0.5)
+        );
         println!(
             "| … within 0.5 cell of what is in reach | {:.0} % | |",
             share(&|r| of(r)[0] - of(r)[1] <= 0.5)
@@ -319,10 +342,21 @@ fn print(rows: &[Row]) {
         "| within 2 cells of the exhaustive optimum, or within 10 % of its loss | {:.0} % |",
         share(&|r| r.search[2] <= 2.0 || r.search[0] <= 1.1 * r.search[1])
     );
-    println!("| the same cell | {:.0} % |", share(&|r| r.search[2] == 0.0));
-    println!("| within 2 cells | {:.0} % |", share(&|r| r.search[2] <= 2.0));
-    println!("| within 10 % of its loss | {:.0} % |\n", share(&|r| r.search[0] <= 1.1 * r.search[1]));
-    println!("| | evaluations | of them with gradient | ms, median | ms, 95th percentile |\n|---|---|---|---|---|");
+    println!(
+        "| the same cell | {:.0} % |",
+        share(&|r| r.search[2] == 0.0)
+    );
+    println!(
+        "| within 2 cells | {:.0} % |",
+        share(&|r| r.search[2] <= 2.0)
+    );
+    println!(
+        "| within 10 % of its loss | {:.0} % |\n",
+        share(&|r| r.search[0] <= 1.1 * r.search[1])
+    );
+    println!(
+        "| | evaluations | of them with gradient | ms, median | ms, 95th percentile |\n|---|---|---|---|---|"
+    );
     for (name, first) in [("search", 3), ("every cell", 6)] {
         let column = |k: usize| sorted(rows, &|r| r.search[first + k]);
         println!(
@@ -337,7 +371,11 @@ fn print(rows: &[Row]) {
     println!("| session | ms, median | ms, 95th percentile |\n|---|---|---|");
     for (name, k) in [("open", 0), ("one grab, patches alone", 1)] {
         let column = sorted(rows, &|r| r.ms[k]);
-        println!("| {name} | {:.1} | {:.1} |", at(&column, 0.5), at(&column, 0.95));
+        println!(
+            "| {name} | {:.1} | {:.1} |",
+            at(&column, 0.5),
+            at(&column, 0.95)
+        );
     }
 }
 

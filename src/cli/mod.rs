@@ -2,6 +2,7 @@
 //! May use every room of the library; exit codes are 0 done, 1 failed, 64 wrong usage or settings.
 //! No geometry, no HTTP routes, no training: a command that grows a second idea wants a room in the library.
 
+mod bench;
 mod bridge;
 mod evaluate;
 mod failure;
@@ -56,6 +57,8 @@ enum Command {
     Train(train::Args),
     /// Measure a network's fills on held-out sheets
     Evaluate(evaluate::Args),
+    /// Measure how long the network and a mend take here
+    Bench(bench::Args),
     /// Print the service's OpenAPI document
     Openapi,
 }
@@ -97,6 +100,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Scarffolds(args) => scarffolds::run(&args),
         Command::Train(args) => train::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
+        Command::Bench(args) => bench::run(&args),
         Command::Openapi => openapi::run(),
     }
 }

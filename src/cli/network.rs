@@ -15,6 +15,11 @@ const SHIPPED: [(&str, &[u8]); 1] = [(
 /// The default weights' file in a directory of weights.
 const STANDARD: &str = "standard.safetensors";
 
+/// The default weights as shipped.
+pub fn standard() -> &'static [u8] {
+    SHIPPED[0].1
+}
+
 #[derive(Debug, clap::Args)]
 pub struct NetworkArgs {
     /// Directory or file of the weights; left out, the shipped ones
@@ -105,9 +110,11 @@ pub fn settings(backend: Backend, autodiff: Autodiff) -> Result<Settings, Failur
         (Autodiff::Burn, BackendKind::Engine) => Some(BackendKind::Flex),
         _ => None,
     };
+    // Copies of a grid, and places of a search, are shared out to all processors; a single grid is one thread's.
+    let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     Ok(Settings {
         backend,
         autodiff,
-        ..Settings::default()
+        engine: darn::net::engine::Options { isa: None, threads },
     })
 }

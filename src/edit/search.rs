@@ -50,7 +50,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Options {
-            walkers: 3,
+            walkers: 4,
             stride: 8.0,
             steps: 32,
             batch: 64,

@@ -64,7 +64,7 @@ impl Default for Limits {
             patch: patch::Options::default(),
             response: Response::default(),
             search: edit::Options::default(),
-            seeds: 8,
+            seeds: 16,
         }
     }
 }

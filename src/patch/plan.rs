@@ -243,7 +243,7 @@ impl Plan {
 }
 
 /// Pulls may stretch an edge this much, ...
-const STRETCH: f64 = 1.2;
+const STRETCH: f64 = 1.25;
 /// ... or this much more than it is stretched without them.
 const MORE: f64 = 1.05;
 /// How often the forces of pulls are halved before they are given up.

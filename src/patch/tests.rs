@@ -62,7 +62,7 @@ fn pulled(slack: f64, to: Vec3, hold: Hold) -> (Patch, Patch, Vec3, f64) {
     let stretch = quality::measure(&patch, &region).stretch_max;
     let usual = quality::measure(&free, &region).stretch_max;
     assert!(
-        stretch <= (1.05 * usual).max(1.2) + 1e-9,
+        stretch <= (1.05 * usual).max(1.25) + 1e-9,
         "{stretch} {usual}"
     );
     (patch, free, pull.to, off)

@@ -1,0 +1,343 @@
+//! `darn bench`: how long the network and a mend take on this machine; engines in turn, so that a busy moment hits all of them.
+
+use super::failure::{Failure, OrFail};
+use super::files;
+use super::network::NetworkArgs;
+use darn::contract::Constraints;
+use darn::grid::{CELLS, NormalGrid, SIDE};
+use darn::net::engine::{Engine, Gradient, Input, Isa, Options, Scratch};
+use darn::net::{BackendKind, NetError, Network, UnetConfig, weights};
+use darn::scan::{Limits, Scan};
+use serde_json::json;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum What {
+    /// Forward passes and input gradients: the engine on every instruction set of this CPU, and burn's backends
+    Net(NetArgs),
+    /// A whole mend, stage by stage
+    Mend(MendArgs),
+}
+
+#[derive(Debug, clap::Args)]
+struct NetArgs {
+    /// Weights file; left out, the shipped standard ones
+    #[arg(long)]
+    weights: Option<PathBuf>,
+    /// Grids in a pass
+    #[arg(long, value_delimiter = ',', default_value = "1,8")]
+    batch: Vec<usize>,
+    /// Threads that share a pass
+    #[arg(long, value_delimiter = ',', default_value = "1,2")]
+    threads: Vec<usize>,
+    /// Turns of every engine
+    #[arg(long, default_value_t = 5)]
+    rounds: usize,
+    /// Milliseconds of a turn
+    #[arg(long, default_value_t = 300)]
+    turn: u64,
+    /// The engine alone, on its best instruction set
+    #[arg(long)]
+    own: bool,
+    /// A line of JSON for each row
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+struct MendArgs {
+    /// The scan
+    scan: PathBuf,
+    /// How often it is mended
+    #[arg(long, default_value_t = 30)]
+    times: usize,
+    #[command(flatten)]
+    network: NetworkArgs,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    match &args.what {
+        What::Net(args) => net(args),
+        What::Mend(args) => mend(args),
+    }
+}
+
+/// One way to compute, and how long it took.
+struct Row<'a> {
+    engine: String,
+    what: &'static str,
+    batch: usize,
+    threads: usize,
+    call: Box<dyn FnMut() -> Result<(), NetError> + 'a>,
+    milliseconds: Vec<f64>,
+}
+
+impl Row<'_> {
+    /// Calls for at least `turn`, at least twice.
+    fn take_turn(&mut self, turn: Duration) -> Result<(), NetError> {
+        let started = Instant::now();
+        let mut calls = 0;
+        while calls < 2 || started.elapsed() < turn {
+            let call = Instant::now();
+            (self.call)()?;
+            self.milliseconds.push(call.elapsed().as_secs_f64() * 1e3);
+            calls += 1;
+        }
+        Ok(())
+    }
+}
+
+fn net(args: &NetArgs) -> Result<(), Failure> {
+    let bytes = match &args.weights {
+        Some(path) => files::read(path)?,
+        None => super::network::standard().to_vec(),
+    };
+    let (card, tensors) = weights::read(&bytes).or_fail("read the weights")?;
+    let config = card.architecture;
+    let mut engines = Vec::new();
+    for threads in &args.threads {
+        let best = Isa::ALL.into_iter().filter(|isa| isa.is_available());
+        let isas: Vec<Isa> = match args.own {
+            true => best.last().into_iter().collect(),
+            false => best.rev().collect(),
+        };
+        for isa in isas {
+            let isa = Some(isa);
+            let threads = *threads;
+            let engine = Engine::new(&tensors, &config, Options { isa, threads });
+            engines.push((threads, engine.or_fail("build the engine")?));
+        }
+    }
+    let mut pools = Vec::new();
+    for threads in &args.threads {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(*threads);
+        pools.push((*threads, pool.build().or_fail("start threads")?));
+    }
+    let burn = if args.own {
+        Vec::new()
+    } else {
+        vec![
+            ("flex", BackendKind::Flex),
+            ("ndarray", BackendKind::Ndarray),
+        ]
+    };
+    let mut networks = Vec::new();
+    for (name, kind) in burn {
+        networks.push((
+            name,
+            Network::load(&bytes, kind).or_fail("load the weights")?,
+        ));
+    }
+    let mut rows = Vec::new();
+    for batch in &args.batch {
+        for (threads, engine) in &engines {
+            let pool = pools.iter().find(|(t, _)| t == threads);
+            let Some((_, pool)) = pool else { continue };
+            rows.extend(own(engine, pool, *batch, *threads));
+        }
+        for (name, network) in &networks {
+            for (threads, pool) in &pools {
+                rows.extend(burns((name, network), pool, *batch, *threads));
+            }
+        }
+    }
+    for _ in 0..args.rounds {
+        for row in &mut rows {
+            let took = row.take_turn(Duration::from_millis(args.turn));
+            took.or_fail(format!("run {}", row.engine))?;
+        }
+    }
+    print(&mut rows, &config, args.json);
+    Ok(())
+}
+
+/// Waves with a square hole in the middle.
+fn grid(number: usize) -> NormalGrid {
+    let at = |k: usize| [k % SIDE, k / SIDE].map(|x| (x as f32 + 0.5) / SIDE as f32 - 0.5);
+    let positions = (0..CELLS).map(|k| {
+        let [u, v] = at(k);
+        [u, v, 0.1 * (9.0 * u + 4.0 * v + number as f32).sin()]
+    });
+    let known = (0..CELLS).map(|k| f32::from(u8::from(at(k).iter().any(|x| x.abs() > 0.2))));
+    NormalGrid {
+        positions: positions.collect(),
+        known: known.collect(),
+        base: Some(vec![[0.0; 3]; CELLS]),
+    }
+}
+
+fn own<'a>(
+    engine: &'a Engine,
+    pool: &'a rayon::ThreadPool,
+    batch: usize,
+    threads: usize,
+) -> [Row<'a>; 2] {
+    let planes: Vec<f32> = (0..batch)
+        .flat_map(|n| {
+            let cells = grid(n).positions;
+            (0..3).flat_map(move |axis| cells.iter().map(|p| p[axis]).collect::<Vec<_>>())
+        })
+        .collect();
+    let known: Vec<f32> = (0..batch).flat_map(|n| grid(n).known).collect();
+    let (x, k) = (planes.clone(), known.clone());
+    let (mut scratch, mut out) = (Scratch::default(), vec![0.0; planes.len()]);
+    let forward = move || {
+        let input = Input {
+            positions: &x,
+            known: &k,
+            base: None,
+        };
+        Ok(pool.install(|| engine.predict(&mut scratch, input, &mut out))?)
+    };
+    let mut scratch = Scratch::default();
+    let mut outs = [planes.len(), planes.len(), known.len()].map(|size| vec![0.0; size]);
+    let gradient = move || {
+        let input = Input {
+            positions: &planes,
+            known: &known,
+            base: None,
+        };
+        let [prediction, by_positions, by_known] = &mut outs;
+        let out = Gradient {
+            prediction,
+            by_positions,
+            by_known,
+        };
+        let cotangent =
+            |_: usize, prediction: &[f32], by: &mut [f32]| by.copy_from_slice(prediction);
+        Ok(pool.install(|| engine.gradient(&mut scratch, input, &cotangent, out))?)
+    };
+    let name = format!("engine {}", engine.isa().name());
+    let row = |what, call| Row {
+        engine: name.clone(),
+        what,
+        batch,
+        threads,
+        call,
+        milliseconds: Vec::new(),
+    };
+    [
+        row("forward", Box::new(forward)),
+        row("gradient", Box::new(gradient)),
+    ]
+}
+
+fn burns<'a>(
+    (name, network): (&'a str, &'a Network),
+    pool: &'a rayon::ThreadPool,
+    batch: usize,
+    threads: usize,
+) -> [Row<'a>; 2] {
+    let grids: Vec<NormalGrid> = (0..batch).map(grid).collect();
+    let forward = move || pool.install(|| network.fill(&grids)).map(drop);
+    let (one, uvs) = (grid(0), vec![[0.5; 2]; batch]);
+    let gradient = move || {
+        let found = pool.install(|| network.anchor_gradients(&one, [0.0; 3], &uvs));
+        found.map(drop)
+    };
+    let row = |what, call| Row {
+        engine: format!("burn {name}"),
+        what,
+        batch,
+        threads,
+        call,
+        milliseconds: Vec::new(),
+    };
+    [
+        row("forward", Box::new(forward)),
+        row("gradient", Box::new(gradient)),
+    ]
+}
+
+/// Multiply-adds of a forward pass count twice; the paper's network of width 64 has 9.15 GFLOP.
+fn gigaflops(config: &UnetConfig) -> f64 {
+    9.15 * (config.width as f64 / 64.0).powi(2)
+}
+
+fn print(rows: &mut [Row], config: &UnetConfig, as_json: bool) {
+    if !as_json {
+        println!(
+            "| engine | what | batch | threads | least ms | median ms | GFLOP/s |\n|---|---|---|---|---|---|---|"
+        );
+    }
+    for row in rows {
+        let (least, median) = spread(&mut row.milliseconds);
+        let (engine, isa) = row.engine.split_once(' ').unwrap_or((&row.engine, ""));
+        if as_json {
+            let line = json!({
+                "engine": engine, "isa": isa, "precision": "f32", "what": row.what, "batch": row.batch,
+                "threads": row.threads, "least_ms": least, "median_ms": median,
+            });
+            println!("{line}");
+            continue;
+        }
+        let rate = match row.what {
+            "forward" => format!("{:.0}", gigaflops(config) * row.batch as f64 / median * 1e3),
+            _ => String::new(),
+        };
+        println!(
+            "| {} | {} | {} | {} | {least:.2} | {median:.2} | {rate} |",
+            row.engine, row.what, row.batch, row.threads
+        );
+    }
+}
+
+/// The least and the median.
+fn spread(numbers: &mut [f64]) -> (f64, f64) {
+    numbers.sort_by(f64::total_cmp);
+    let at = |k: usize| numbers.get(k).copied().unwrap_or(0.0);
+    (at(0), at(numbers.len() / 2))
+}
+
+fn mend(args: &MendArgs) -> Result<(), Failure> {
+    let name = args.scan.display();
+    let bytes = files::read(&args.scan)?;
+    let mender = args.network.mender()?;
+    let mut stages: Vec<(&str, Vec<f64>)> = Vec::new();
+    for _ in 0..=args.times {
+        let started = Instant::now();
+        let scan = Scan::read(&bytes, &Limits::default()).or_fail(format!("read {name}"))?;
+        let read = started.elapsed();
+        let mended = darn::mend::mend(&scan, &Constraints::default(), &mender);
+        let mended = mended.or_fail(format!("mend {name}"))?.with_read_time(read);
+        let scan = mended.report.timings.unwrap_or_default();
+        let sum = |of: fn(&darn::contract::v1::HoleTimings) -> f64| -> f64 {
+            let each = mended.report.holes.iter().flat_map(|hole| &hole.timings);
+            each.map(of).sum()
+        };
+        let all = [
+            ("read", scan.read),
+            ("weld", scan.weld),
+            ("loops", scan.loops),
+            ("region", sum(|t| t.region)),
+            ("flatten", sum(|t| t.flatten)),
+            ("raster", sum(|t| t.raster)),
+            ("net", sum(|t| t.net)),
+            ("patch", sum(|t| t.patch)),
+            ("report", sum(|t| t.report)),
+            ("write", scan.write),
+            ("total", scan.total),
+        ];
+        if stages.is_empty() {
+            // The first mend warms up.
+            stages = all.map(|(name, _)| (name, Vec::new())).into();
+            continue;
+        }
+        for ((_, numbers), (_, number)) in stages.iter_mut().zip(all) {
+            numbers.push(number);
+        }
+    }
+    println!("| stage | least ms | median ms |\n|---|---|---|");
+    for (stage, numbers) in &mut stages {
+        let (least, median) = spread(numbers);
+        println!("| {stage} | {least:.2} | {median:.2} |");
+    }
+    Ok(())
+}
