@@ -105,7 +105,7 @@ fn net(args: &NetArgs) -> Result<(), Failure> {
     for threads in &args.threads {
         let best = Isa::ALL.into_iter().filter(|isa| isa.is_available());
         let isas: Vec<Isa> = match args.own {
-            true => best.last().into_iter().collect(),
+            true => best.rev().take(1).collect(),
             false => best.rev().collect(),
         };
         for isa in isas {

@@ -24,7 +24,7 @@ const ANCHORS: usize = 6;
 /// Weight in the data loss of cells that were known: keeps the network's opinion sane there at little cost.
 const KNOWN_WEIGHT: f32 = 0.1;
 /// The base of a network that wants none.
-const NO_BASE: [[f32; 3]; CELLS] = [[0.0; 3]; CELLS];
+static NO_BASE: [[f32; 3]; CELLS] = [[0.0; 3]; CELLS];
 /// Batches each thread makes ahead.
 const AHEAD: usize = 2;
 
