@@ -75,7 +75,7 @@ struct Row<'a> {
     what: &'static str,
     batch: usize,
     threads: usize,
-    call: Box<dyn FnMut() -> Result<(), NetError> + 'a>,
+    call: Call<'a>,
     milliseconds: Vec<f64>,
 }
 
@@ -215,18 +215,12 @@ fn own<'a>(
         Ok(pool.install(|| engine.gradient(&mut scratch, input, &cotangent, out))?)
     };
     let name = format!("engine {}", engine.isa().name());
-    let row = |what, call| Row {
-        engine: name.clone(),
-        what,
-        batch,
-        threads,
-        call,
-        milliseconds: Vec::new(),
-    };
-    [
-        row("forward", Box::new(forward)),
-        row("gradient", Box::new(gradient)),
-    ]
+    both(
+        &name,
+        [batch, threads],
+        Box::new(forward),
+        Box::new(gradient),
+    )
 }
 
 fn burns<'a>(
@@ -242,18 +236,32 @@ fn burns<'a>(
         let found = pool.install(|| network.anchor_gradients(&one, [0.0; 3], &uvs));
         found.map(drop)
     };
-    let row = |what, call| Row {
-        engine: format!("burn {name}"),
+    let name = format!("burn {name}");
+    both(
+        &name,
+        [batch, threads],
+        Box::new(forward),
+        Box::new(gradient),
+    )
+}
+
+type Call<'a> = Box<dyn FnMut() -> Result<(), NetError> + 'a>;
+
+/// The rows of an engine's two passes.
+fn both<'a>(
+    engine: &str,
+    [batch, threads]: [usize; 2],
+    forward: Call<'a>,
+    gradient: Call<'a>,
+) -> [Row<'a>; 2] {
+    [("forward", forward), ("gradient", gradient)].map(|(what, call)| Row {
+        engine: engine.to_owned(),
         what,
         batch,
         threads,
         call,
         milliseconds: Vec::new(),
-    };
-    [
-        row("forward", Box::new(forward)),
-        row("gradient", Box::new(gradient)),
-    ]
+    })
 }
 
 /// Multiply-adds of a forward pass count twice; the paper's network of width 64 has 9.15 GFLOP.

@@ -16,6 +16,8 @@ mod unet;
 pub mod weights;
 
 #[cfg(test)]
+mod anchor_tests;
+#[cfg(test)]
 mod tests;
 
 use std::str::FromStr;
