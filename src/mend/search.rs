@@ -11,6 +11,9 @@ use crate::grid::{CELLS, NormalGrid, SIDE, cell_centre};
 use crate::mesh::{Vec2, Vec3};
 use crate::net::NetError;
 
+/// Targets farther away than this many extents of the hole are looked for that far along the same line: the network's numbers are f32.
+const FAR: f64 = 100.0;
+
 /// The losses of an anchor at a target, cell by cell.
 struct Losses<'a> {
     inpainter: &'a Inpainter<'a>,
@@ -20,6 +23,8 @@ struct Losses<'a> {
 
 impl<'a> Losses<'a> {
     fn new(prepared: &Prepared, inpainter: &'a Inpainter<'a>, target: Vec3) -> Losses<'a> {
+        let centre = prepared.normal.centre;
+        let target = centre + (target - centre).cap_magnitude(FAR * prepared.extent());
         Losses {
             grid: inpainter.turned(&prepared.normal_grid()),
             target: inpainter.entering(prepared.normal.to_network(&target)),

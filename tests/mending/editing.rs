@@ -274,6 +274,28 @@ fn the_search_finds_what_trying_every_cell_finds() {
 }
 
 #[test]
+fn a_target_out_of_this_world_is_searched_for_all_the_same() {
+    let cloth = Edited::of(sheet(0));
+    let search = Search {
+        hole: None,
+        target: [1e17, 0.0, 0.0],
+        start: None,
+        exhaustive: false,
+        map: false,
+    };
+    let found = cloth.session.optimize_anchor(&search).unwrap();
+    assert!(found.loss.is_finite() && found.distance > 9e16);
+    let asked = anchored(vec![Anchor {
+        hole: None,
+        uv: None,
+        position: search.target,
+        hard: false,
+    }]);
+    let (positions, _) = cloth.session.positions(&asked).unwrap();
+    assert!(positions[0].iter().all(|p| p.norm() < 1e3));
+}
+
+#[test]
 fn a_session_answers_as_single_calls_do() {
     let sheet = laid(|u, v| [u, 0.03 * (9.0 * u).sin(), -v]);
     let bytes = packed(&holed(&sheet, &ROUND).mesh, &[]);
