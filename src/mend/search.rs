@@ -19,15 +19,18 @@ struct Losses<'a> {
     inpainter: &'a Inpainter<'a>,
     grid: NormalGrid,
     target: [f32; 3],
+    /// How far the target was drawn in, scene units.
+    drawn_in: f64,
 }
 
 impl<'a> Losses<'a> {
     fn new(prepared: &Prepared, inpainter: &'a Inpainter<'a>, target: Vec3) -> Losses<'a> {
         let centre = prepared.normal.centre;
-        let target = centre + (target - centre).cap_magnitude(FAR * prepared.extent());
+        let near = centre + (target - centre).cap_magnitude(FAR * prepared.extent());
         Losses {
+            drawn_in: (target - near).norm(),
             grid: inpainter.turned(&prepared.normal_grid()),
-            target: inpainter.entering(prepared.normal.to_network(&target)),
+            target: inpainter.entering(prepared.normal.to_network(&near)),
             inpainter,
         }
     }
@@ -103,6 +106,7 @@ pub fn find(
         walk(prepared, &losses, first, limits)?
     };
     let mut answer = answer(prepared, &found);
+    answer.distance += losses.drawn_in;
     if search.map {
         chart(prepared, &losses, &found, (&mut answer, limits))?;
     }
