@@ -2,7 +2,7 @@
 
 use super::failure::{Failure, OrFail};
 use darn::net::{InputKind, UnetConfig};
-use darn::train::{LossWeights, Progress, Score, Start, TrainOptions};
+use darn::train::{LossWeights, Progress, Score, Start, TrainOptions, Trainer};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -47,6 +47,9 @@ pub struct Args {
     /// What counts as an error
     #[arg(long, value_enum, default_value = "standard")]
     loss: Loss,
+    /// What computes the steps: burn, or the engine, which is several times as fast but needs weights to start from
+    #[arg(long, default_value = "burn")]
+    trainer: Trainer,
     /// Seed of weights and samples
     #[arg(long, default_value_t = TrainOptions::default().seed)]
     seed: u64,
@@ -132,6 +135,7 @@ impl Args {
                 Start::Fresh
             },
             from: self.from.clone(),
+            trainer: self.trainer,
             network: UnetConfig {
                 width: self.width,
                 input: self.input.kind(),

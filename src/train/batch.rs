@@ -1,6 +1,7 @@
 //! From samples to batches: symmetries, noise on what is known, revealed anchors, normalisation, the network's frame.
 //! Batch `k` depends on the seed and `k` alone, so that a resumed run sees what an unbroken one would have seen.
 
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};
 
@@ -225,6 +226,27 @@ impl Batch {
                 .extend((0..CELLS - SIDE).map(|k| pair(k, k + SIDE)));
         }
         batch
+    }
+}
+
+impl Batch {
+    /// Some of the samples.
+    pub fn part(&self, samples: Range<usize>) -> Batch {
+        let part = |values: &[f32]| {
+            let one = values.len() / self.count.max(1);
+            values[samples.start * one..samples.end * one].to_vec()
+        };
+        Batch {
+            count: samples.len(),
+            positions: part(&self.positions),
+            known: part(&self.known),
+            base: part(&self.base),
+            truth: part(&self.truth),
+            weight: part(&self.weight),
+            hole: part(&self.hole),
+            pairs_u: part(&self.pairs_u),
+            pairs_v: part(&self.pairs_v),
+        }
     }
 }
 

@@ -3,32 +3,16 @@
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
-use burn::tensor::backend::AutodiffBackend;
-use burn::tensor::{Tensor, TensorData};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 
-use super::optimiser::AdamW;
+use super::student::Snapshot;
 use super::{TrainError, TrainOptions};
-use crate::net::weights::{NamedTensors, export, import};
-use crate::net::{Convolve, Unet};
+use crate::net::weights::NamedTensors;
 
 /// File name inside the output directory.
 const FILE: &str = "checkpoint.safetensors";
 const KEY: &str = "darn-checkpoint";
-
-/// A run between two steps. The samples' generator needs no state: batch k follows from the seed and k.
-#[derive(Debug)]
-pub struct State<B: AutodiffBackend> {
-    /// The network being trained.
-    pub network: Unet<B>,
-    /// Its average over the last steps, which is what ships.
-    pub averaged: Unet<B::InnerBackend>,
-    /// The optimiser's moments and step.
-    pub optimiser: AdamW<B::InnerBackend>,
-    /// Seconds trained so far, over all sittings.
-    pub seconds: f64,
-}
 
 #[derive(Debug, Serialize, Deserialize)]
 struct Header {
@@ -37,30 +21,27 @@ struct Header {
     options: TrainOptions,
 }
 
-/// Writes the state into `dir`.
-pub fn save<B: AutodiffBackend>(
-    state: &State<B>,
+/// Writes a run's state after so many seconds of training, all sittings together, into `dir`.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn save(
+    snapshot: &Snapshot,
+    seconds: f64,
     options: &TrainOptions,
     dir: &Path,
 ) -> Result<(), TrainError> {
-    use burn::module::AutodiffModule;
-    let mut tensors: NamedTensors = BTreeMap::new();
-    let mut add = |prefix: &str, named: NamedTensors| {
-        tensors.extend(
-            named
-                .into_iter()
-                .map(|(name, t)| (format!("{prefix}{name}"), t)),
-        )
-    };
-    add("network.", export(&state.network.valid()));
-    add("averaged.", export(&state.averaged));
-    for (index, moments) in state.optimiser.moments.iter().enumerate() {
-        for (name, moment) in ["first", "second"].iter().zip(moments) {
-            let values: Vec<f32> = moment
-                .to_data()
-                .convert::<f32>()
-                .into_vec()
-                .unwrap_or_default();
+    let mut tensors: BTreeMap<String, (Vec<usize>, &[f32])> = BTreeMap::new();
+    for (prefix, named) in [
+        ("network", &snapshot.network),
+        ("averaged", &snapshot.averaged),
+    ] {
+        for (name, (shape, values)) in named {
+            tensors.insert(format!("{prefix}.{name}"), (shape.clone(), values));
+        }
+    }
+    for (index, moments) in snapshot.moments.iter().enumerate() {
+        for (name, values) in ["first", "second"].iter().zip(moments) {
             tensors.insert(format!("{name}.{index:04}"), (vec![values.len()], values));
         }
     }
@@ -70,8 +51,8 @@ pub fn save<B: AutodiffBackend>(
         reason,
     };
     let header = Header {
-        step: state.optimiser.step,
-        seconds: state.seconds,
+        step: snapshot.step,
+        seconds,
         options: options.clone(),
     };
     let header = serde_json::to_string(&header).map_err(|e| refuse(e.to_string()))?;
@@ -97,18 +78,11 @@ pub fn save<B: AutodiffBackend>(
     replace(&path, &file)
 }
 
-/// Reads the state in `dir` back into a network of the options' architecture.
+/// Reads the state in `dir` back, and the seconds it was trained for.
 ///
 /// # Errors
-/// No checkpoint, a damaged one, or one of another architecture, batch size or seed.
-pub fn load<B>(
-    options: &TrainOptions,
-    dir: &Path,
-    device: &B::Device,
-) -> Result<State<B>, TrainError>
-where
-    B: AutodiffBackend<InnerBackend: Convolve> + Convolve,
-{
+/// No checkpoint, a damaged one, or one of another architecture, batch size, seed or trainer.
+pub fn load(options: &TrainOptions, dir: &Path) -> Result<(Snapshot, f64), TrainError> {
     let path = dir.join(FILE);
     let bytes = std::fs::read(&path).map_err(|source| TrainError::File {
         path: path.clone(),
@@ -126,10 +100,10 @@ where
         .and_then(|m| m.get(KEY))
         .ok_or_else(|| refuse("not a checkpoint".into()))?;
     let header: Header = serde_json::from_str(header).map_err(|e| refuse(e.to_string()))?;
-    let same = |o: &TrainOptions| (o.network, o.batch, o.seed);
+    let same = |o: &TrainOptions| (o.network, o.batch, o.seed, o.trainer);
     if same(&header.options) != same(options) {
         return Err(refuse(
-            "it belongs to another architecture, batch size or seed".into(),
+            "it belongs to another architecture, batch size, seed or trainer".into(),
         ));
     }
     let mut groups: BTreeMap<String, NamedTensors> = BTreeMap::new();
@@ -151,30 +125,16 @@ where
             .insert(name.to_owned(), (view.shape().to_vec(), values));
     }
     let mut group = |name: &str| groups.remove(name).unwrap_or_default();
-    let inner = B::Device::default();
-    let network = import(options.network.init::<B>(device), &group("network"))?;
-    let averaged = import(
-        options.network.init::<B::InnerBackend>(&inner),
-        &group("averaged"),
-    )?;
-    let flat = |(_, values): (Vec<usize>, Vec<f32>)| {
-        let n = values.len();
-        Tensor::<B::InnerBackend, 1>::from_data(TensorData::new(values, [n]), &inner)
+    let snapshot = Snapshot {
+        network: group("network"),
+        averaged: group("averaged"),
+        moments: (group("first").into_values())
+            .zip(group("second").into_values())
+            .map(|((_, first), (_, second))| [first, second])
+            .collect(),
+        step: header.step,
     };
-    let moments = group("first")
-        .into_values()
-        .zip(group("second").into_values())
-        .map(|(a, b)| [flat(a), flat(b)])
-        .collect();
-    Ok(State {
-        network,
-        averaged,
-        optimiser: AdamW {
-            step: header.step,
-            moments,
-        },
-        seconds: header.seconds,
-    })
+    Ok((snapshot, header.seconds))
 }
 
 /// Writes a file so that a reader sees the old or the new one, never a part.

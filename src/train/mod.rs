@@ -3,12 +3,15 @@
 //! No cloth simulation, no HTTP: sheets come from `scarffolds`, and nothing here is reached by a request.
 
 pub mod batch;
+mod burned;
 pub mod checkpoint;
 pub mod curves;
+mod engined;
 pub mod loss;
 mod near;
 pub mod optimiser;
 pub mod score;
+mod student;
 pub mod trainer;
 
 #[cfg(test)]
@@ -22,13 +25,17 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
+use crate::net::engine::EngineError;
 use crate::net::{FrameKind, NetError, UnetConfig};
 use crate::scarffolds;
 use crate::scarffolds::samples::{Sampler, Turning};
 
 pub use crate::scarffolds::samples::Sample;
+pub use burned::Burned;
+pub use engined::Engined;
 pub use loss::{LossKind, LossWeights};
 pub use score::Score;
+pub use student::{Snapshot, Student, Trainer};
 pub use trainer::{Progress, Sources, Summary};
 
 /// Samples that scores are measured on.
@@ -48,6 +55,8 @@ pub enum TrainError {
     Sheets { path: PathBuf, reason: String },
     #[error(transparent)]
     Net(#[from] NetError),
+    #[error(transparent)]
+    Engine(#[from] EngineError),
     #[error("checkpoint {path}: {reason}")]
     Checkpoint { path: PathBuf, reason: String },
     #[error("the loss is not finite at step {step}; a lower learning rate may help")]
@@ -74,6 +83,9 @@ pub struct TrainOptions {
     /// A fresh run starts from these weights instead of random ones.
     #[serde(default)]
     pub from: Option<PathBuf>,
+    /// What computes the steps.
+    #[serde(default)]
+    pub trainer: Trainer,
     /// The network.
     pub network: UnetConfig,
     /// Weights of the loss's terms.
@@ -110,6 +122,7 @@ impl Default for TrainOptions {
             out: "train".into(),
             resume: Start::Fresh,
             from: None,
+            trainer: Trainer::Burn,
             network: UnetConfig::default(),
             loss: LossWeights::default(),
             batch: 16,
@@ -122,7 +135,7 @@ impl Default for TrainOptions {
     }
 }
 
-/// Trains on the CPU (burn-flex) with the sheets in `options.sheets`, reporting after every step.
+/// Trains on the CPU (burn-flex, or the engine) with the sheets in `options.sheets`, reporting after every step.
 ///
 /// # Errors
 /// Unreadable sheets or checkpoint, files that cannot be written, a loss that is not finite.
@@ -147,7 +160,10 @@ pub fn run(
         held_out,
         data_seed,
     };
-    trainer::train::<Autodiff<Flex>>(options, sources, progress)
+    match options.trainer {
+        Trainer::Burn => trainer::train::<Burned<Autodiff<Flex>>>(options, sources, progress),
+        Trainer::Engine => trainer::train::<Engined>(options, sources, progress),
+    }
 }
 
 type Source = Arc<dyn Fn(&mut ChaCha8Rng) -> Sample + Send + Sync>;

@@ -7,13 +7,13 @@ use burn::optim::GradientsParams;
 use burn::tensor::Tensor;
 use burn::tensor::backend::{AutodiffBackend, Backend};
 
-const BETA1: f64 = 0.9;
-const BETA2: f64 = 0.99;
-const EPSILON: f64 = 1e-8;
+pub const BETA1: f64 = 0.9;
+pub const BETA2: f64 = 0.99;
+pub const EPSILON: f64 = 1e-8;
 /// Decay of kernels; vectors do not decay.
-const DECAY: f64 = 1e-2;
+pub const DECAY: f64 = 1e-2;
 /// Largest norm of the whole gradient.
-const CLIP: f64 = 1.0;
+pub const CLIP: f64 = 1.0;
 /// The average's memory never exceeds this many steps' share.
 const AVERAGE: f64 = 0.998;
 
@@ -126,9 +126,14 @@ impl<B: AutodiffBackend> ModuleMapper<B> for Update<'_, B::InnerBackend> {
     }
 }
 
+/// What the average keeps of itself at a step, which counts from 1.
+pub fn share_kept(step: u64) -> f64 {
+    AVERAGE.min((1.0 + step as f64) / (10.0 + step as f64))
+}
+
 /// Moves the averaged module towards the current one, running statistics included; `step` counts from 1.
 pub fn average<B: Backend, M: Module<B>>(averaged: M, current: &M, step: u64) -> M {
-    let keep = AVERAGE.min((1.0 + step as f64) / (10.0 + step as f64));
+    let keep = share_kept(step);
     let mut collect = Collect { values: Vec::new() };
     current.visit(&mut collect);
     averaged.map(&mut Average {

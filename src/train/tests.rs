@@ -13,10 +13,9 @@ use super::loss::{Target, loss};
 use super::score::score;
 use super::*;
 use crate::grid::{CELLS, SIDE, cell_centre, cell_index};
-use crate::net::weights::export;
 use crate::net::{BackendKind, InputKind, Network};
 
-type B = Autodiff<Flex>;
+type B = Burned<Autodiff<Flex>>;
 
 fn config(frame: FrameKind) -> UnetConfig {
     UnetConfig {
@@ -217,17 +216,16 @@ fn training_learns_resumes_and_ships_what_loads() {
     );
     assert!(network.card().scores["fill_rmse_cells"] > 0.0);
 
-    let state = checkpoint::load::<B>(&options, dir.path(), &Default::default()).unwrap();
-    assert_eq!(state.optimiser.step, summary.steps);
+    let (snapshot, seconds) = checkpoint::load(&options, dir.path()).unwrap();
+    assert_eq!(snapshot.step, summary.steps);
     assert_eq!(
-        state.optimiser.moments.len(),
-        export(&state.averaged)
-            .keys()
+        snapshot.moments.len(),
+        (snapshot.averaged.keys())
             .filter(|name| !name.ends_with(".mean") && !name.ends_with(".variance"))
             .count()
     );
     let copy = tempfile::tempdir().unwrap();
-    checkpoint::save(&state, &options, copy.path()).unwrap();
+    checkpoint::save(&snapshot, seconds, &options, copy.path()).unwrap();
     let read = |dir: &Path| std::fs::read(dir.join("checkpoint.safetensors")).unwrap();
     assert!(
         read(dir.path()) == read(copy.path()),
@@ -242,6 +240,40 @@ fn training_learns_resumes_and_ships_what_loads() {
     assert!(matches!(
         trainer::train::<B>(&options, sources(), &mut |_| {}),
         Err(TrainError::Checkpoint { .. })
+    ));
+}
+
+#[test]
+fn the_engine_goes_on_from_what_burn_has_learned() {
+    let (dir, further) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let first = trainer::train::<B>(&options(dir.path()), sources(), &mut |_| {}).unwrap();
+    let mut options = TrainOptions {
+        from: Some(first.weights),
+        trainer: Trainer::Engine,
+        rate: 3e-3,
+        ..options(further.path())
+    };
+    let second = trainer::train::<Engined>(&options, sources(), &mut |_| {}).unwrap();
+    assert!(
+        second.score.rmse < first.score.rmse,
+        "{:?} {:?}",
+        first.score,
+        second.score
+    );
+    let (snapshot, _) = checkpoint::load(&options, further.path()).unwrap();
+    let flex = B::of(snapshot.clone(), &options).unwrap();
+    let engine = Engined::of(snapshot, &options).unwrap();
+    let held: Vec<_> = (sources().held_out.iter())
+        .filter_map(|sample| prepare(sample, &options.network))
+        .collect();
+    let answers = [flex.predictions(&held), engine.predictions(&held)].map(Result::unwrap);
+    for (a, b) in answers[0].iter().flatten().zip(answers[1].iter().flatten()) {
+        assert!((0..3).all(|axis| (a[axis] - b[axis]).abs() < 1e-4));
+    }
+    options.from = None;
+    assert!(matches!(
+        trainer::train::<Engined>(&options, sources(), &mut |_| {}),
+        Err(TrainError::Options(_))
     ));
 }
 

@@ -6,6 +6,7 @@ use super::map::{Map, panels};
 use super::network::{DOWN, Folds, Forward, Reverse, side};
 use super::pack::Layer;
 use super::simd::{Kernel, Simd, Target};
+use super::sums::WeightSums;
 
 /// Room for the gradients of some images, by the name of what they are with respect to.
 #[derive(Debug)]
@@ -48,13 +49,15 @@ impl Gradients {
         }
     }
 
-    /// From `result[0]` to `input`; the activations are those of the forward pass of the same images.
+    /// From `result[0]` to `input`; the activations are those of the forward pass of the same images. `sums`, if any, receive what the
+    /// weights gain, and `input` nothing then.
     pub fn run(
         &mut self,
         target: Target,
         images: usize,
         (network, reverse): (&Forward, &Reverse),
         (activations, saved): (&Activations, &Saved),
+        mut sums: Option<&mut WeightSums>,
     ) {
         let work = &mut self.work;
         for level in 0..DOWN {
@@ -63,6 +66,12 @@ impl Gradients {
             let (result, middle) = (&self.result[level], &mut self.middle[level]);
             let gate = Finish::Gate(&saved.middle[level]);
             second.run((target, work), images, all(result), whole(middle), gate);
+            let mut sums = sums.as_deref_mut().map(|sums| &mut sums.up[level]);
+            if let Some(sums) = &mut sums {
+                let [first, second] = &mut sums.block;
+                second.add(target, images, all(&saved.middle[level]), all(result));
+                first.add(target, images, all(&activations.joined[level]), all(middle));
+            }
             let joined = &mut self.joined[level];
             first.run(
                 (target, work),
@@ -77,14 +86,18 @@ impl Gradients {
                 &network.up[level].gate,
                 (&activations.skip[level], &activations.joined[level]),
                 (&activations.open[level][..cells], &saved.joint[level]),
-                joined,
+                (joined, sums.as_deref_mut().map(|sums| &mut sums.gate)),
             );
             let signal = Source {
                 first: joined.panels / 2,
                 map: joined,
             };
             let below = saved.result.get(level + 1);
-            let below = Finish::Gate(below.unwrap_or(&activations.skip[level + 1]));
+            let below = below.unwrap_or(&activations.skip[level + 1]);
+            if let Some(sums) = sums {
+                sums.add_up(target, images, below, signal);
+            }
+            let below = Finish::Gate(below);
             let result = &mut self.result[level + 1];
             up.conv
                 .run((target, work), images, signal, whole(result), below);
@@ -105,6 +118,18 @@ impl Gradients {
             let (result, middle) = (&self.result[level], &mut self.middle[level]);
             let gate = Finish::Gate(&activations.middle[level]);
             second.run((target, work), images, all(result), whole(middle), gate);
+            if let Some(sums) = sums.as_deref_mut() {
+                let [first, second] = &mut sums.down[level];
+                let x = match level {
+                    0 => &activations.input,
+                    _ => &activations.pooled[level - 1],
+                };
+                second.add(target, images, all(&activations.middle[level]), all(result));
+                first.add(target, images, all(x), all(middle));
+                if level == 0 {
+                    return;
+                }
+            }
             let input = match level {
                 0 => &mut self.input,
                 _ => &mut self.pooled[level - 1],

@@ -64,6 +64,7 @@ pub enum Finish<'a> {
 }
 
 /// The panels of a map from `first` on.
+#[derive(Clone, Copy)]
 pub struct Source<'a> {
     pub map: &'a Map,
     pub first: usize,

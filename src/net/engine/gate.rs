@@ -7,6 +7,7 @@ use super::map::{Map, panels};
 use super::network::GateFolds;
 use super::pack::{Parts, matrix, vector};
 use super::simd::{Block, Kernel, Simd, Target};
+use super::sums::{GateCells, GateSums};
 
 /// Cells that go through together.
 const CELLS: usize = 16;
@@ -205,14 +206,14 @@ impl GateAdjoint {
     }
 
     /// `gradient`, with respect to the gate's output and the signal beside it, becomes the one with respect to the skip and to the signal
-    /// before its ReLU. `skip`, `joined`, `open` and `joint` are the forward pass's.
+    /// before its ReLU. `skip`, `joined`, `open` and `joint` are the forward pass's. `sums`, if any, receive what the weights gain.
     pub fn run(
         &self,
         (target, work): (Target, &mut Work),
         gate: &Gate,
         (skip, joined): (&Map, &Map),
         (open, joint): (&[f32], &[Block]),
-        gradient: &mut Map,
+        (gradient, mut sums): (&mut Map, Option<&mut GateSums>),
     ) {
         for (first, (open, joint)) in open
             .chunks(CELLS)
@@ -227,11 +228,32 @@ impl GateAdjoint {
                 open,
                 gradient,
             };
+            let mut slopes = [0.0; CELLS];
             target.run(Enter {
                 run: &run,
                 joint,
                 input: &mut work.input,
+                slopes: &mut slopes,
             });
+            if let Some(sums) = sums.as_deref_mut() {
+                let spans = Spans::new(skip.side);
+                for (span, place, image) in spans.of(run.first..run.first + open.len()) {
+                    let cells = span..span + spans.length;
+                    let map = |panel: usize| if panel < gate.panels { skip } else { joined };
+                    sums.add(
+                        target,
+                        GateCells {
+                            seen: &|panel| {
+                                let map = map(panel);
+                                &map.blocks[map.index([image, panel], place)..][..spans.length]
+                            },
+                            by_joint: &|panel| &work.input[panel * CELLS..][cells.clone()],
+                            joint: &joint[span * gate.inner..],
+                            by_score: &slopes[cells.clone()],
+                        },
+                    );
+                }
+            }
             target.run(Multiply {
                 input: &work.input,
                 depth: gate.inner,
@@ -263,6 +285,8 @@ struct Enter<'a, 'b> {
     run: &'a Run<'b>,
     joint: &'a [Block],
     input: &'a mut [Block],
+    /// The gradient with respect to each cell's score.
+    slopes: &'a mut [f32; CELLS],
 }
 
 impl Kernel for Enter<'_, '_> {
@@ -285,7 +309,8 @@ impl Kernel for Enter<'_, '_> {
             for (cell, sum) in (span..span + spans.length).zip(sums) {
                 let mut block = Block::ZERO;
                 s.store(sum, &mut block);
-                let slope = s.splat(block.sum() * open[cell] * (1.0 - open[cell]));
+                self.slopes[cell] = block.sum() * open[cell] * (1.0 - open[cell]);
+                let slope = s.splat(self.slopes[cell]);
                 for (panel, score) in gate.score.iter().enumerate() {
                     let joint = s.load(&self.joint[cell * gate.inner + panel]);
                     let by = s.gate(s.mul(slope, s.load(score)), joint);

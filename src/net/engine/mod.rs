@@ -1,11 +1,12 @@
-//! The network's own engine: exactly the attention U-Net of [`crate::net::Unet`], its forward pass and its input gradient, on the CPU.
+//! The network's own engine: exactly the attention U-Net of [`crate::net::Unet`], its forward pass and its gradients, on the CPU.
 //! Weights come as named tensors, grids as planes; burn is the reference it is tested against.
-//! No burn, no files, no training; and no `unsafe` but in `simd.rs`.
+//! No burn, no files, no losses; and no `unsafe` but in `simd.rs`.
 
 mod backward;
 mod convolve;
 mod forward;
 mod gate;
+mod learn;
 mod map;
 mod membrane;
 mod network;
@@ -13,6 +14,7 @@ mod pack;
 mod scheme;
 mod scratch;
 mod simd;
+mod sums;
 
 #[cfg(test)]
 pub(super) mod reference;
@@ -29,6 +31,7 @@ use crate::net::weights::NamedTensors;
 use network::{Folds, Forward, Reverse};
 use simd::Target;
 
+pub use learn::{Lesson, Lessons};
 pub use scratch::Scratch;
 pub use simd::{Isa, UnknownIsa};
 

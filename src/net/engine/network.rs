@@ -1,5 +1,7 @@
 //! The network's weights, ready for the kernels: read and folded once, forward layers at load, adjoint ones when first wanted.
 
+use rayon::prelude::*;
+
 use super::EngineError;
 use super::gate::{Gate, GateAdjoint};
 use super::pack::{Folded, Layer, Parts, Plan, Turn, tensor};
@@ -136,16 +138,17 @@ impl Forward {
     pub fn pack(folds: &Folds) -> Forward {
         let block = |level: usize, [first, second]: &[Folded; 2], parts: usize| {
             let (plan, to) = (Plan::of_side(side(level)), Parts(first.to));
-            [
-                Layer::pack(plan, first, [Parts(parts), to]),
-                Layer::pack(plan, second, [to, to]),
-            ]
+            let (first, second) = rayon::join(
+                || Layer::pack(plan, first, [Parts(parts), to]),
+                || Layer::pack(plan, second, [to, to]),
+            );
+            [first, second]
         };
         Forward {
-            down: (folds.down.iter().enumerate())
+            down: (folds.down.par_iter().enumerate())
                 .map(|(level, convs)| block(level, convs, convs[0].from))
                 .collect(),
-            up: (folds.up.iter().enumerate())
+            up: (folds.up.par_iter().enumerate())
                 .map(|(level, up)| UpLayers {
                     conv: Layer::pack(Plan::Up, &up.conv, [Parts(up.conv.from), Parts(up.conv.to)]),
                     gate: Gate::pack(&up.gate),
@@ -175,16 +178,17 @@ impl Reverse {
     pub fn pack(folds: &Folds) -> Reverse {
         let block = |level: usize, [first, second]: &[Folded; 2], parts: usize| {
             let (plan, from) = (Plan::of_side(side(level)), Parts(first.to));
-            [
-                Layer::pack(plan, &first.adjoint(Turn::Half), [from, Parts(parts)]),
-                Layer::pack(plan, &second.adjoint(Turn::Half), [from, from]),
-            ]
+            let (first, second) = rayon::join(
+                || Layer::pack(plan, &first.adjoint(Turn::Half), [from, Parts(parts)]),
+                || Layer::pack(plan, &second.adjoint(Turn::Half), [from, from]),
+            );
+            [first, second]
         };
         Reverse {
-            down: (folds.down.iter().enumerate())
+            down: (folds.down.par_iter().enumerate())
                 .map(|(level, convs)| block(level, convs, convs[0].from))
                 .collect(),
-            up: (folds.up.iter().enumerate())
+            up: (folds.up.par_iter().enumerate())
                 .map(|(level, up)| UpReverse {
                     conv: Layer::pack(
                         Plan::Down,

@@ -8,7 +8,7 @@ use super::{EngineError, Tensor};
 use crate::net::weights::NamedTensors;
 
 /// Keeps the division finite for a channel of no variance; as in training.
-const EPSILON: f64 = 1e-5;
+pub const EPSILON: f64 = 1e-5;
 
 /// Which scheme a layer is computed by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,7 +91,7 @@ impl Folded {
     }
 
     /// Number of weights from one input channel to one output channel.
-    fn taps(&self) -> usize {
+    pub fn taps(&self) -> usize {
         self.kernel.len() / (self.to * self.from).max(1)
     }
 
@@ -134,11 +134,13 @@ pub enum Turn {
 pub struct Parts(pub usize);
 
 impl Parts {
-    fn slot(self, channel: usize) -> usize {
+    /// Where a channel lies, in lanes.
+    pub fn slot(self, channel: usize) -> usize {
         channel / self.0 * panels(self.0) * LANES + channel % self.0
     }
 
-    fn panels(self, channels: usize) -> usize {
+    /// How many panels so many channels take.
+    pub fn panels(self, channels: usize) -> usize {
         channels.div_ceil(self.0) * panels(self.0)
     }
 }

@@ -13,7 +13,7 @@ use crate::net::InputKind;
 use crate::net::unet::{INPUT_SCALE, OUTPUT_SCALE};
 
 /// Grids that go through the layers together: more share the reading of the weights, fewer stay in the cache.
-const TOGETHER: usize = 4;
+pub const TOGETHER: usize = 4;
 
 /// Room for the calls of one thread, for one engine; it grows to what is asked and is kept.
 #[derive(Debug, Default)]
@@ -26,13 +26,19 @@ pub struct Scratch {
 struct Lane {
     forward: Option<Activations>,
     backward: Option<(Saved, Gradients)>,
-    pyramid: Pyramid,
+    fill: Room,
     /// Planes of one grid.
     planes: Vec<f32>,
-    /// Planes of one grid's distance from its base.
-    off: Vec<f32>,
     /// By the prediction's planes, grid after grid.
     cotangents: Vec<f32>,
+}
+
+/// Room for what the network sees of one grid.
+#[derive(Debug, Default)]
+pub struct Room {
+    pyramid: Pyramid,
+    /// Planes of the grid's distance from its base.
+    off: Vec<f32>,
 }
 
 impl Scratch {
@@ -122,7 +128,7 @@ impl Lane {
         for image in 0..images {
             let grid = input.part(image..image + 1);
             let out = image3_mut(all, image);
-            enter(engine, (&mut self.pyramid, &mut self.off), grid, out);
+            enter(engine, &mut self.fill, grid, out);
             lay_out((out, grid.known), image, &mut room.input);
         }
         let features = room.run(target, images, network, None);
@@ -160,7 +166,7 @@ impl Lane {
         for image in 0..images {
             let grid = input.part(image..image + 1);
             let filled = image3_mut(out.prediction, image);
-            enter(engine, (&mut self.pyramid, &mut self.off), grid, filled);
+            enter(engine, &mut self.fill, grid, filled);
             lay_out((filled, grid.known), image, &mut room.input);
         }
         let features = room.run(target, images, network, Some(saved));
@@ -181,7 +187,7 @@ impl Lane {
                 result: &mut gradients.result[0],
             });
         }
-        gradients.run(target, images, (network, reverse), (room, saved));
+        gradients.run(target, images, (network, reverse), (room, saved), None);
         for image in 0..images {
             let grid = input.part(image..image + 1);
             let by_positions = image3_mut(out.by_positions, image);
@@ -201,8 +207,9 @@ impl Lane {
                         *by += direct;
                     }
                     let by = (by_positions, by_known);
-                    let x = (off_base(grid, &mut self.off), grid.known);
-                    adjoint(target, &mut self.pyramid, x, &self.planes, by);
+                    let Room { pyramid, off } = &mut self.fill;
+                    let x = (off_base(grid, off), grid.known);
+                    adjoint(target, pyramid, x, &self.planes, by);
                 }
             }
         }
@@ -219,21 +226,16 @@ impl Lane {
     }
 }
 
-fn image3(planes: &[f32], image: usize) -> &[f32] {
+pub fn image3(planes: &[f32], image: usize) -> &[f32] {
     &planes[image * 3 * CELLS..][..3 * CELLS]
 }
 
-fn image3_mut(planes: &mut [f32], image: usize) -> &mut [f32] {
+pub fn image3_mut(planes: &mut [f32], image: usize) -> &mut [f32] {
     &mut planes[image * 3 * CELLS..][..3 * CELLS]
 }
 
 /// One grid's positions as the network sees them, but for their scale.
-fn enter(
-    engine: &Engine,
-    (pyramid, off): (&mut Pyramid, &mut Vec<f32>),
-    grid: Input,
-    filled: &mut [f32],
-) {
+pub fn enter(engine: &Engine, Room { pyramid, off }: &mut Room, grid: Input, filled: &mut [f32]) {
     match engine.config.input {
         InputKind::Membrane | InputKind::Plate => {
             let x = (off_base(grid, off), grid.known);
@@ -261,7 +263,7 @@ fn off_base<'a>(grid: Input<'a>, off: &'a mut Vec<f32>) -> &'a [f32] {
 }
 
 /// Three planes, scaled, and the mask as the channels of one panel.
-fn lay_out((filled, known): (&[f32], &[f32]), image: usize, input: &mut Map) {
+pub fn lay_out((filled, known): (&[f32], &[f32]), image: usize, input: &mut Map) {
     for row in 0..SIDE {
         for (column, to) in input.row_mut([image, 0], row).iter_mut().enumerate() {
             let cell = row * SIDE + column;
@@ -287,11 +289,11 @@ fn take_out(input: &Map, image: usize, (by_filled, by_known): (&mut [f32], &mut 
 }
 
 /// The last layer: features to positions, added to the membrane in `out` or put in its place.
-struct Last<'a> {
-    engine: &'a Engine,
-    features: &'a Map,
-    image: usize,
-    out: &'a mut [f32],
+pub struct Last<'a> {
+    pub engine: &'a Engine,
+    pub features: &'a Map,
+    pub image: usize,
+    pub out: &'a mut [f32],
 }
 
 impl Kernel for Last<'_> {
@@ -332,12 +334,12 @@ fn padded(weights: &[f32]) -> Block {
 }
 
 /// The gradient with respect to the features before their ReLU.
-struct LastAdjoint<'a> {
-    engine: &'a Engine,
-    features: &'a Map,
-    image: usize,
-    cotangent: &'a [f32],
-    result: &'a mut Map,
+pub struct LastAdjoint<'a> {
+    pub engine: &'a Engine,
+    pub features: &'a Map,
+    pub image: usize,
+    pub cotangent: &'a [f32],
+    pub result: &'a mut Map,
 }
 
 impl Kernel for LastAdjoint<'_> {

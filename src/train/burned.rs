@@ -1,0 +1,165 @@
+//! Training steps by burn, on any autodiff backend.
+
+use burn::module::AutodiffModule;
+use burn::optim::GradientsParams;
+use burn::tensor::backend::{AutodiffBackend, Backend};
+use burn::tensor::{Tensor, TensorData};
+
+use super::batch::{Batch, Prepared};
+use super::loss::{Target, loss};
+use super::optimiser::{AdamW, average};
+use super::student::{Learned, Snapshot, Student, terms};
+use super::{TrainError, TrainOptions};
+use crate::grid::{CELLS, SIDE};
+use crate::net::weights::{self, export};
+use crate::net::{Convolve, InputKind, Unet, UnetConfig, cells, over};
+
+/// A network of burn's with its optimiser.
+#[derive(Debug)]
+pub struct Burned<B: AutodiffBackend> {
+    config: UnetConfig,
+    network: Unet<B>,
+    averaged: Unet<B::InnerBackend>,
+    optimiser: AdamW<B::InnerBackend>,
+}
+
+impl<B> Student for Burned<B>
+where
+    B: AutodiffBackend<InnerBackend: Convolve> + Convolve,
+{
+    fn of(snapshot: Snapshot, options: &TrainOptions) -> Result<Self, TrainError> {
+        let config = options.network;
+        let device = B::Device::default();
+        let inner = Default::default();
+        let flat = |values: Vec<f32>| {
+            let n = values.len();
+            Tensor::<B::InnerBackend, 1>::from_data(TensorData::new(values, [n]), &inner)
+        };
+        Ok(Burned {
+            config,
+            network: weights::build::<B>(&config, &snapshot.network, &device)?,
+            averaged: weights::build::<B::InnerBackend>(&config, &snapshot.averaged, &inner)?,
+            optimiser: AdamW {
+                step: snapshot.step,
+                moments: (snapshot.moments.into_iter())
+                    .map(|pair| pair.map(flat))
+                    .collect(),
+            },
+        })
+    }
+
+    fn step(
+        &mut self,
+        batch: Batch,
+        options: &TrainOptions,
+        rate: f64,
+    ) -> Result<Learned, TrainError> {
+        let device = B::Device::default();
+        let Inputs {
+            positions,
+            known,
+            base,
+        } = Inputs::<B::InnerBackend>::of(&batch);
+        // The fill does not depend on the weights: it is computed outside the graph.
+        let filled = match self.config.input {
+            InputKind::Zeros => positions,
+            InputKind::Membrane | InputKind::Plate => over(Some(base), positions, known.clone()),
+        };
+        let (filled, known) = (
+            Tensor::<B, 4>::from_inner(filled),
+            Tensor::from_inner(known),
+        );
+        let predicted = match self.config.input {
+            InputKind::Zeros => self.network.predict(InputKind::Zeros, filled, known, None),
+            InputKind::Membrane | InputKind::Plate => {
+                self.network.residual(filled.clone(), known) + filled
+            }
+        };
+        let loss = loss(predicted, &Target::of(batch, &device), &options.loss);
+        let terms = terms(&loss);
+        let gradients = GradientsParams::from_grads(loss.total.backward(), &self.network);
+        let network = self.network.clone();
+        let (network, norm) = self.optimiser.step::<B, _>(network, gradients, rate);
+        self.network = network;
+        let averaged = self.averaged.clone();
+        self.averaged = average(averaged, &self.network.valid(), self.optimiser.step);
+        Ok((terms, norm))
+    }
+
+    fn steps(&self) -> u64 {
+        self.optimiser.step
+    }
+
+    fn snapshot(&self) -> Snapshot {
+        let flat = |x: &Tensor<B::InnerBackend, 1>| {
+            let data = x.to_data().convert::<f32>();
+            data.into_vec().unwrap_or_default()
+        };
+        let moments = self.optimiser.moments.iter();
+        Snapshot {
+            network: export(&self.network.valid()),
+            averaged: export(&self.averaged),
+            moments: moments.map(|pair| pair.each_ref().map(flat)).collect(),
+            step: self.optimiser.step,
+        }
+    }
+
+    fn predictions(&self, samples: &[Prepared]) -> Result<Vec<Vec<[f32; 3]>>, TrainError> {
+        Ok(answers(samples, |x: Inputs<B::InnerBackend>| {
+            self.averaged
+                .predict(self.config.input, x.positions, x.known, Some(x.base))
+        }))
+    }
+}
+
+/// What a batch shows the network.
+struct Inputs<B: Backend> {
+    /// `[count, 3, 64, 64]`.
+    positions: Tensor<B, 4>,
+    /// `[count, 1, 64, 64]`.
+    known: Tensor<B, 4>,
+    /// `[count, 3, 64, 64]`.
+    base: Tensor<B, 4>,
+}
+
+impl<B: Backend> Inputs<B> {
+    fn of(batch: &Batch) -> Self {
+        let device = B::Device::default();
+        let tensor = |values: &[f32], channels: usize| {
+            Tensor::from_data(
+                TensorData::new(values.to_vec(), [batch.count, channels, SIDE, SIDE]),
+                &device,
+            )
+        };
+        Inputs {
+            positions: tensor(&batch.positions, 3),
+            known: tensor(&batch.known, 1),
+            base: tensor(&batch.base, 3),
+        }
+    }
+}
+
+/// What the network sees in unknown cells, as an answer, for comparison.
+pub fn input_fill<B: Backend>(samples: &[Prepared]) -> Vec<Vec<[f32; 3]>> {
+    answers(samples, |x: Inputs<B>| {
+        over(Some(x.base), x.positions, x.known)
+    })
+}
+
+fn answers<B: Backend>(
+    samples: &[Prepared],
+    answer: impl Fn(Inputs<B>) -> Tensor<B, 4>,
+) -> Vec<Vec<[f32; 3]>> {
+    let chunks = samples.chunks(8).flat_map(|chunk| {
+        let planes: Vec<f32> = answer(Inputs::of(&Batch::of(chunk)))
+            .into_data()
+            .convert::<f32>()
+            .into_vec()
+            .unwrap_or_default();
+        planes
+            .chunks_exact(3 * CELLS)
+            .map(cells)
+            .collect::<Vec<_>>()
+    });
+    chunks.collect()
+}

@@ -1,0 +1,152 @@
+//! Whoever takes a training step: burn with any backend, or darn's own engine. The loop does not know which.
+
+use std::str::FromStr;
+
+use burn::backend::Flex;
+use burn::tensor::Tensor;
+use burn::tensor::backend::Backend;
+use serde::{Deserialize, Serialize};
+
+use super::batch::{Batch, Prepared};
+use super::loss::Loss;
+use super::{TrainError, TrainOptions};
+use crate::net::UnetConfig;
+use crate::net::weights::{self, NamedTensors, export};
+
+/// What computes the steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Trainer {
+    /// burn: batch norm with the statistics of each batch; from random weights or given ones.
+    #[default]
+    Burn,
+    /// darn's own kernels, several times as fast: batch norm keeps its statistics, so it starts from weights that burn has trained.
+    Engine,
+}
+
+impl FromStr for Trainer {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Trainer, String> {
+        match name {
+            "burn" => Ok(Trainer::Burn),
+            "engine" => Ok(Trainer::Engine),
+            _ => Err(format!("there is no trainer `{name}`: burn or engine")),
+        }
+    }
+}
+
+/// A run between two steps. The samples' generator needs no state: batch k follows from the seed and k.
+#[derive(Debug, Clone, Default)]
+pub struct Snapshot {
+    /// The network being trained.
+    pub network: NamedTensors,
+    /// Its average over the last steps, which is what ships.
+    pub averaged: NamedTensors,
+    /// The optimiser's first and second moments, one pair a trained tensor, in the student's own order.
+    pub moments: Vec<[Vec<f32>; 2]>,
+    /// Steps taken.
+    pub step: u64,
+}
+
+/// The loss with its terms (data, gradient, stretch, self-penetration), and the gradient's norm.
+pub type Learned = ([f32; 5], f64);
+
+/// Something that can be trained.
+pub trait Student: Sized {
+    /// Goes on from a snapshot.
+    ///
+    /// # Errors
+    /// Tensors of another network.
+    fn of(snapshot: Snapshot, options: &TrainOptions) -> Result<Self, TrainError>;
+
+    /// One step on a batch.
+    ///
+    /// # Errors
+    /// A network that cannot be asked.
+    fn step(
+        &mut self,
+        batch: Batch,
+        options: &TrainOptions,
+        rate: f64,
+    ) -> Result<Learned, TrainError>;
+
+    /// Steps taken.
+    fn steps(&self) -> u64;
+
+    /// All that a later sitting needs.
+    fn snapshot(&self) -> Snapshot;
+
+    /// The averaged network's answers for prepared samples, in their own frame.
+    ///
+    /// # Errors
+    /// A network that cannot be asked.
+    fn predictions(&self, samples: &[Prepared]) -> Result<Vec<Vec<[f32; 3]>>, TrainError>;
+}
+
+impl Snapshot {
+    /// A fresh run's: random weights, or those of a file.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or holds another architecture.
+    pub fn fresh(options: &TrainOptions) -> Result<Snapshot, TrainError> {
+        let network = match &options.from {
+            None => {
+                let device = Default::default();
+                Flex::seed(&device, options.seed);
+                export(&options.network.init::<Flex>(&device))
+            }
+            Some(_) => given(options)?,
+        };
+        Ok(Snapshot {
+            averaged: network.clone(),
+            network,
+            ..Snapshot::default()
+        })
+    }
+}
+
+/// The weights that a run starts from.
+fn given(options: &TrainOptions) -> Result<NamedTensors, TrainError> {
+    let path = options.from.clone().unwrap_or_default();
+    let bytes = std::fs::read(&path).map_err(|source| TrainError::File {
+        path: path.clone(),
+        source,
+    })?;
+    let (card, mut tensors) = weights::read(&bytes)?;
+    weights::check(&card, &tensors)?;
+    let same = UnetConfig {
+        input: options.network.input,
+        ..card.architecture
+    };
+    if same != options.network {
+        return Err(TrainError::Options(format!(
+            "{} holds another architecture than the one to train",
+            path.display()
+        )));
+    }
+    if card.architecture != options.network {
+        // What it has learned to see stays of use; what is to be added to another fill is to be learned anew.
+        let last = tensors
+            .iter_mut()
+            .filter(|(name, _)| name.starts_with("last."));
+        last.for_each(|(_, (_, values))| values.fill(0.0));
+    }
+    Ok(tensors)
+}
+
+/// A loss's numbers.
+pub fn terms<B: Backend>(loss: &Loss<B>) -> [f32; 5] {
+    let number = |x: &Tensor<B, 1>| {
+        let data = x.to_data().convert::<f32>();
+        data.iter::<f32>().next().unwrap_or(f32::NAN)
+    };
+    [
+        &loss.total,
+        &loss.data,
+        &loss.gradient,
+        &loss.stretch,
+        &loss.self_penetration,
+    ]
+    .map(number)
+}
