@@ -196,6 +196,7 @@ fn own<'a>(
             positions: &x,
             known: &k,
             base: None,
+            up: None,
         };
         Ok(pool.install(|| engine.predict(&mut scratch, input, &mut out))?)
     };
@@ -206,6 +207,7 @@ fn own<'a>(
             positions: &planes,
             known: &known,
             base: None,
+            up: None,
         };
         let [prediction, by_positions, by_known] = &mut outs;
         let out = Gradient {

@@ -1,7 +1,7 @@
 //! `darn train`: train a network on simulated sheets.
 
 use super::failure::{Failure, OrFail};
-use darn::net::{InputKind, UnetConfig};
+use darn::net::{FrameKind, InputKind, UnetConfig};
 use darn::train::{LossWeights, Progress, Score, Start, TrainOptions, Trainer};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
@@ -44,6 +44,9 @@ pub struct Args {
     /// What the network sees in unknown cells
     #[arg(long, value_enum, default_value = "plate")]
     input: Input,
+    /// Keep up up: the network is told where it is, and is for scans that say so
+    #[arg(long)]
+    upright: bool,
     /// What counts as an error
     #[arg(long, value_enum, default_value = "standard")]
     loss: Loss,
@@ -139,7 +142,11 @@ impl Args {
             network: UnetConfig {
                 width: self.width,
                 input: self.input.kind(),
-                ..UnetConfig::default()
+                frame: if self.upright {
+                    FrameKind::Hanging
+                } else {
+                    FrameKind::Canonical
+                },
             },
             loss: self.loss.weights(),
             batch: self.batch,

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use crate::contract::{FieldError, v1};
 use crate::grid::NormalGrid;
 use crate::mesh::Vec3;
-use crate::net::{AnchorLoss, FrameKind, NetError, Network, Networks, WeightsCard};
+use crate::net::{AnchorLoss, NetError, Network, Networks, WeightsCard};
 
 /// The network for a request that gives an up direction and names no weights.
 const FOR_UP: &str = "gravity";
@@ -43,7 +43,7 @@ impl<'a> Inpainter<'a> {
             (None, None) => networks.default(),
         };
         let card = network.card();
-        let (name, given) = (&card.name, card.architecture.frame == FrameKind::Given);
+        let (name, given) = (&card.name, card.architecture.frame.knows_up());
         if given && up.is_none() {
             let detail = format!(
                 "`{name}` was trained on cloth that hangs; it needs `up`, the direction against gravity"

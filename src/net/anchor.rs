@@ -8,8 +8,8 @@ use burn::backend::Autodiff;
 use burn::module::{HasAutodiffModule, Module};
 use burn::tensor::{Tensor, TensorData, backend::Backend};
 
-use super::unet::{Unet, UnetConfig};
-use super::{Convolve, Frame, NetError, base_of, planes};
+use super::unet::{Sight, Unet, UnetConfig};
+use super::{Convolve, Frame, NetError, base_of, planes, up_of};
 use crate::grid::{CELLS, NormalGrid, SIDE};
 
 /// Standard deviation of the Gaussian, in cells: at half its height it is 1.3 cells wide.
@@ -33,13 +33,21 @@ struct Stage<B: Backend> {
     /// `[1, 3, 64, 64]`.
     base: Option<Tensor<B, 4>>,
     /// `[1, 3]`.
+    up: Option<Tensor<B, 2>>,
+    /// `[1, 3]`.
     target: Tensor<B, 2>,
 }
 
 impl<B: Backend> Stage<B> {
     fn of(config: &UnetConfig, grid: &NormalGrid, target: [f32; 3]) -> Self {
         let device = B::Device::default();
-        let (planes, target, base) = show(config, grid, target);
+        let Scene {
+            planes,
+            target,
+            base,
+            up,
+        } = show(config, grid, target);
+        let three = |x: [f32; 3]| Tensor::from_data(TensorData::new(x.to_vec(), [1, 3]), &device);
         Stage {
             positions: Tensor::from_data(TensorData::new(planes, [1, 3, SIDE, SIDE]), &device),
             known: Tensor::from_data(
@@ -48,7 +56,8 @@ impl<B: Backend> Stage<B> {
             ),
             base: base
                 .map(|base| Tensor::from_data(TensorData::new(base, [1, 3, SIDE, SIDE]), &device)),
-            target: Tensor::from_data(TensorData::new(target.to_vec(), [1, 3]), &device),
+            up: up.map(three),
+            target: three(target),
         }
     }
 
@@ -63,9 +72,13 @@ impl<B: Backend> Stage<B> {
         let bell = along_v.matmul(along_u).reshape([n, 1, SIDE, SIDE]);
         let known = self.known.clone().repeat_dim(0, n);
         let soft = known.clone() + bell.clone() * (known.neg() + 1.0);
-        let base = self.base.clone().map(|base| base.repeat_dim(0, n));
-        let positions = self.positions.clone().repeat_dim(0, n);
-        let answer = unet.predict(config.input, positions, soft, base);
+        let sight = Sight {
+            positions: self.positions.clone().repeat_dim(0, n),
+            known: soft,
+            base: self.base.clone().map(|base| base.repeat_dim(0, n)),
+            up: self.up.clone().map(|up| up.repeat_dim(0, n)),
+        };
+        let answer = unet.predict(config.input, sight);
         let weight = bell.reshape([n, 1, CELLS]);
         let total = weight.clone().sum_dim(2);
         let read = (answer.reshape([n, 3, CELLS]) * weight.repeat_dim(1, 3)).sum_dim(2);
@@ -75,13 +88,19 @@ impl<B: Backend> Stage<B> {
     }
 }
 
-/// The scan's positions where known, the target elsewhere, as planes `[3, 64, 64]`; the target; and the base, where the network wants
-/// one. All in the network's frame.
-pub(super) fn show(
-    config: &UnetConfig,
-    grid: &NormalGrid,
-    target: [f32; 3],
-) -> (Vec<f32>, [f32; 3], Option<Vec<f32>>) {
+/// A search's grid in the network's frame.
+pub(super) struct Scene {
+    /// The scan's positions where known, the target elsewhere: `[3, 64, 64]`.
+    pub planes: Vec<f32>,
+    pub target: [f32; 3],
+    /// `[3, 64, 64]`, where the network wants one.
+    pub base: Option<Vec<f32>>,
+    /// Where the network wants to know.
+    pub up: Option<[f32; 3]>,
+}
+
+/// A grid and a target as the network sees them.
+pub(super) fn show(config: &UnetConfig, grid: &NormalGrid, target: [f32; 3]) -> Scene {
     // The anchor itself does not turn the frame: it would make the loss depend on the place in one more way.
     let frame = Frame::of(config.frame, grid);
     let target = frame.enter(target);
@@ -95,7 +114,12 @@ pub(super) fn show(
         let turned: Vec<[f32; 3]> = base.iter().map(|p| frame.enter(*p)).collect();
         planes(&[turned])
     });
-    (planes(&[cells]), target, base)
+    Scene {
+        planes: planes(&[cells]),
+        target,
+        base,
+        up: up_of(config, &frame),
+    }
 }
 
 /// exp(−(k − x)² / 2σ²) at the cells k of a line: `[n, 1] -> [n, 64]`.

@@ -16,6 +16,28 @@ pub enum FrameKind {
     /// Turned so that x runs along u and y along v, as well as the known cells allow.
     #[default]
     Canonical,
+    /// As canonical, and the network is told where up is: +z of the given frame, in three channels more.
+    Hanging,
+}
+
+impl FrameKind {
+    /// Whether a network of this frame wants +z to be up in what it is given.
+    pub fn knows_up(self) -> bool {
+        self != FrameKind::Canonical
+    }
+
+    /// Whether the grid is turned before the network sees it.
+    pub fn turns(self) -> bool {
+        self != FrameKind::Given
+    }
+
+    /// Channels of what the network sees: positions, mask, and up.
+    pub fn channels(self) -> usize {
+        match self {
+            FrameKind::Given | FrameKind::Canonical => 4,
+            FrameKind::Hanging => 7,
+        }
+    }
 }
 
 /// The rotation from the given frame to the one the network was trained in.
@@ -27,13 +49,20 @@ impl Frame {
     pub fn of(kind: FrameKind, grid: &NormalGrid) -> Frame {
         match kind {
             FrameKind::Given => Frame(Matrix3::identity()),
-            FrameKind::Canonical => Frame(procrustes(grid).unwrap_or_else(Matrix3::identity)),
+            FrameKind::Canonical | FrameKind::Hanging => {
+                Frame(procrustes(grid).unwrap_or_else(Matrix3::identity))
+            }
         }
     }
 
     /// A position in the network's frame.
     pub fn enter(&self, p: [f32; 3]) -> [f32; 3] {
         array(self.0 * vector(p))
+    }
+
+    /// The given frame's +z, in the network's.
+    pub fn up(&self) -> [f32; 3] {
+        self.enter([0.0, 0.0, 1.0])
     }
 
     /// A position of the network's frame, in the given one.

@@ -34,7 +34,7 @@ pub use convolve::Convolve;
 pub use fill::{InputKind, membrane, over, plate};
 pub use frame::{Frame, FrameKind};
 pub use networks::Networks;
-pub use unet::{Unet, UnetConfig};
+pub use unet::{Sight, Unet, UnetConfig};
 pub use weights::{TrainingCard, WeightsCard};
 
 use shared::Shared;
@@ -173,6 +173,13 @@ impl Network {
         })
     }
 
+    /// Does what the first answer would otherwise wait for; a network that is never asked saves the memory.
+    pub fn prepare(&self) {
+        if let Runtime::Engine(engine) = &self.forward {
+            engine.prepare();
+        }
+    }
+
     /// What the weights are.
     pub fn card(&self) -> &WeightsCard {
         &self.card
@@ -302,6 +309,8 @@ struct Shown {
     known: Vec<f32>,
     /// `[count, 3, 64, 64]`, for networks that want it.
     base: Option<Vec<f32>>,
+    /// `[count, 3]`, for networks that want it.
+    up: Option<Vec<f32>>,
 }
 
 /// The fill that a network wants under a grid's anchors, in the grid's frame: the grid's own, else made of its known cells.
@@ -314,6 +323,11 @@ fn base_of(config: &UnetConfig, grid: &NormalGrid) -> Option<Vec<[f32; 3]>> {
         plate.unwrap_or_else(|| vec![[0.0; 3]; CELLS])
     };
     wanted.then(|| grid.base.clone().unwrap_or_else(made))
+}
+
+/// Where up is in a frame, for a network that wants to know.
+fn up_of(config: &UnetConfig, frame: &Frame) -> Option<[f32; 3]> {
+    (config.frame == FrameKind::Hanging).then(|| frame.up())
 }
 
 /// Grids of checked size turned to the network's frame, shown to it, its answer turned back.
@@ -335,10 +349,13 @@ fn seen(
         .map(|(g, f)| Some(turned(&base_of(config, g)?, f)))
         .collect();
     let known = grids.iter().flat_map(|grid| grid.known.iter().copied());
+    let up = frames.iter().map(|frame| up_of(config, frame));
+    let up: Option<Vec<[f32; 3]>> = up.collect();
     let answer = answer(Shown {
         positions: planes(&positions),
         known: known.collect(),
         base: base.map(|base| planes(&base)),
+        up: up.map(|up| up.as_flattened().to_vec()),
     })?;
     let cells = answer.chunks_exact(3 * CELLS).map(cells);
     Ok(cells
@@ -357,9 +374,14 @@ fn predict<B: Convolve>(unet: &Unet<B>, config: &UnetConfig, shown: Shown) -> Ve
             &device,
         )
     };
-    let (positions, known) = (tensor(shown.positions, 3), tensor(shown.known, 1));
-    let base = shown.base.map(|base| tensor(base, 3));
-    unet.predict(config.input, positions, known, base)
+    let up = shown.up.map(|up| TensorData::new(up, [count, 3]));
+    let sight = Sight {
+        positions: tensor(shown.positions, 3),
+        known: tensor(shown.known, 1),
+        base: shown.base.map(|base| tensor(base, 3)),
+        up: up.map(|up| Tensor::from_data(up, &device)),
+    };
+    unet.predict(config.input, sight)
         .into_data()
         .convert::<f32>()
         .into_vec::<f32>()

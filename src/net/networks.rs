@@ -10,8 +10,10 @@ pub struct Networks {
 }
 
 impl Networks {
-    /// Networks of which the first is used where nobody chooses; of several with one name, the first counts.
+    /// Networks of which the first is used where nobody chooses; of several with one name, the first counts. The
+    /// others are prepared when first asked.
     pub fn new(default: Network, others: Vec<Network>) -> Networks {
+        default.prepare();
         Networks { default, others }
     }
 

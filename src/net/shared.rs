@@ -29,6 +29,11 @@ impl Shared {
         })
     }
 
+    /// See [`Engine::prepare`].
+    pub fn prepare(&self) {
+        self.engine.prepare();
+    }
+
     /// Predicts all cells of what is shown: `[count, 3, 64, 64]`.
     ///
     /// # Errors
@@ -82,6 +87,7 @@ impl Shown {
             positions: &self.positions,
             known: &self.known,
             base: self.base.as_deref(),
+            up: self.up.as_deref(),
         }
     }
 }

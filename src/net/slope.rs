@@ -4,7 +4,7 @@
 //! With the bell b(u, v), the soft mask Y = known + b (1 − known), the answer f(Y) and r = Σ b f / Σ b, the loss is ‖r − P‖² and
 //! ∂L/∂u = Σ (∂L/∂Y (1 − known) + ∂L/∂r · (f − r) / Σ b) ∂b/∂u.
 
-use super::anchor::{AnchorLoss, SIGMA, show};
+use super::anchor::{AnchorLoss, SIGMA, Scene, show};
 use super::shared::Shared;
 use super::{NetError, Shown, UnetConfig};
 use crate::grid::{CELLS, NormalGrid, SIDE};
@@ -74,7 +74,12 @@ impl Stage {
         (grid, target): (&NormalGrid, [f32; 3]),
         uvs: &[[f32; 2]],
     ) -> Stage {
-        let (planes, target, base) = show(config, grid, target);
+        let Scene {
+            planes,
+            target,
+            base,
+            up,
+        } = show(config, grid, target);
         let bells: Vec<Bell> = uvs.iter().map(Bell::new).collect();
         let soft = bells.iter().flat_map(|bell| {
             let each = grid.known.iter().enumerate();
@@ -85,6 +90,7 @@ impl Stage {
                 positions: planes.repeat(uvs.len()),
                 known: soft.collect(),
                 base: base.map(|base| base.repeat(uvs.len())),
+                up: up.map(|up| up.repeat(uvs.len())),
             },
             known: grid.known.clone(),
             target,

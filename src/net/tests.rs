@@ -96,8 +96,17 @@ fn backends_have_names() {
 #[cfg(feature = "ndarray")]
 #[test]
 fn backends_agree_with_the_reference() {
-    for input in [InputKind::Plate, InputKind::Membrane, InputKind::Zeros] {
-        let config = UnetConfig { input, ..CONFIG };
+    for (input, frame) in [
+        (InputKind::Plate, FrameKind::Canonical),
+        (InputKind::Plate, FrameKind::Hanging),
+        (InputKind::Membrane, FrameKind::Canonical),
+        (InputKind::Zeros, FrameKind::Given),
+    ] {
+        let config = UnetConfig {
+            input,
+            frame,
+            ..CONFIG
+        };
         let bytes = write(&tensors(config), &card(config)).unwrap();
         let grids = [bent(disk), bent(|i, j| i > 40 || j < 5)];
         let answers = [BackendKind::Engine, BackendKind::Flex, BackendKind::Ndarray]
@@ -329,29 +338,39 @@ fn what_stands_in_unknown_cells_does_not_matter() {
     );
 }
 
+/// How far the fill of a turned grid is from the turned fill.
+fn off_the_turned_fill(frame: FrameKind, turn: Vector3<f32>) -> f32 {
+    let config = UnetConfig { frame, ..CONFIG };
+    let bytes = write(&tensors(config), &card(config)).unwrap();
+    let network = Network::load(&bytes, BackendKind::Flex).unwrap();
+    let turn = Rotation3::new(turn);
+    let turned = |cells: &[[f32; 3]]| -> Vec<[f32; 3]> {
+        let cells = cells.iter().map(|p| (turn * Vector3::from(*p)).into());
+        cells.collect()
+    };
+    let grid = bent(disk);
+    let moved = NormalGrid {
+        positions: turned(&grid.positions),
+        known: grid.known.clone(),
+        base: None,
+    };
+    let answers = network.fill(&[grid, moved]).unwrap();
+    largest_distance(&answers[1], &turned(&answers[0]))
+}
+
 #[test]
 fn the_fill_turns_with_the_cloth() {
-    let bytes = write(&tensors(CONFIG), &card(CONFIG)).unwrap();
-    let network = Network::load(&bytes, BackendKind::Flex).unwrap();
-    let grid = bent(disk);
-    let straight = network.fill(std::slice::from_ref(&grid)).unwrap();
-    for axis in [Vector3::new(0.3, 1.9, -0.4), Vector3::new(-2.0, 0.1, 2.0)] {
-        let turn = Rotation3::new(axis);
-        let turned = |cells: &[[f32; 3]]| -> Vec<[f32; 3]> {
-            cells
-                .iter()
-                .map(|p| (turn * Vector3::from(*p)).into())
-                .collect()
-        };
-        let answer = network
-            .fill(&[NormalGrid {
-                positions: turned(&grid.positions),
-                known: grid.known.clone(),
-                base: None,
-            }])
-            .unwrap();
-        assert!(largest_distance(&answer[0], &turned(&straight[0])) < 1e-3 * CELL);
+    for turn in [Vector3::new(0.3, 1.9, -0.4), Vector3::new(-2.0, 0.1, 2.0)] {
+        assert!(off_the_turned_fill(FrameKind::Canonical, turn) < 1e-3 * CELL);
     }
+}
+
+#[test]
+fn a_network_that_is_told_where_up_is_turns_the_fill_about_it_only() {
+    let about_up = Vector3::new(0.0, 0.0, 1.3);
+    assert!(off_the_turned_fill(FrameKind::Hanging, about_up) < 1e-3 * CELL);
+    let over = Vector3::new(1.3, 0.0, 0.0);
+    assert!(off_the_turned_fill(FrameKind::Hanging, over) > 0.01 * CELL);
 }
 
 #[test]

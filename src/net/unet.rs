@@ -49,7 +49,7 @@ impl UnetConfig {
     /// A network with random weights and a last layer near zero.
     pub fn init<B: Convolve>(&self, device: &B::Device) -> Unet<B> {
         let channels: Vec<usize> = (0..=DOWN).map(|level| self.width << level).collect();
-        let mut down = vec![Block::new([4, channels[0]], device)];
+        let mut down = vec![Block::new([self.frame.channels(), channels[0]], device)];
         down.extend(
             channels
                 .windows(2)
@@ -67,7 +67,20 @@ impl UnetConfig {
     }
 }
 
-/// The network: `[batch, 4, 64, 64] -> [batch, 3, 64, 64]`.
+/// What some grids show the network.
+#[derive(Debug, Clone)]
+pub struct Sight<B: Backend> {
+    /// `[batch, 3, 64, 64]`; those of unknown cells are not looked at.
+    pub positions: Tensor<B, 4>,
+    /// `[batch, 1, 64, 64]` in 0..=1.
+    pub known: Tensor<B, 4>,
+    /// The fill of [`InputKind::Plate`], `[batch, 3, 64, 64]`; zero where there is none.
+    pub base: Option<Tensor<B, 4>>,
+    /// Where up is, `[batch, 3]`, for [`FrameKind::Hanging`] and for no other.
+    pub up: Option<Tensor<B, 2>>,
+}
+
+/// The network: `[batch, 4, 64, 64] -> [batch, 3, 64, 64]`; seven channels instead of four where it is told where up is.
 #[derive(Module, Debug)]
 pub struct Unet<B: Backend> {
     down: Vec<Block<B>>,
@@ -104,38 +117,42 @@ struct Gate<B: Backend> {
 }
 
 impl<B: Convolve> Unet<B> {
-    /// Predicts all cells from the known ones, in the network's units.
+    /// Predicts all cells from the known ones, in the network's units: `[batch, 3, 64, 64]`.
     ///
-    /// `positions [batch, 3, 64, 64]`, `known [batch, 1, 64, 64]` in 0..=1 `-> [batch, 3, 64, 64]`. Positions of unknown cells are not
-    /// looked at. Differentiable in both. The prediction is the network's own for every cell, known ones too. `base [batch, 3, 64, 64]` is
-    /// the fill of [`InputKind::Plate`]; without it, and for other inputs, zero.
-    pub fn predict(
-        &self,
-        input: InputKind,
-        positions: Tensor<B, 4>,
-        known: Tensor<B, 4>,
-        base: Option<Tensor<B, 4>>,
-    ) -> Tensor<B, 4> {
+    /// Differentiable in all that is seen. The prediction is the network's own for every cell, known ones too.
+    pub fn predict(&self, input: InputKind, sight: Sight<B>) -> Tensor<B, 4> {
+        let Sight {
+            positions,
+            known,
+            base,
+            up,
+        } = sight;
         match input {
-            InputKind::Zeros => {
-                self.forward(Tensor::cat(
-                    vec![positions * known.clone() * INPUT_SCALE, known],
-                    1,
-                )) * OUTPUT_SCALE
-            }
+            InputKind::Zeros => self.residual(positions * known.clone(), known, up),
             InputKind::Membrane | InputKind::Plate => {
                 let filled = fill::over(base, positions, known.clone());
-                self.residual(filled.clone(), known) + filled
+                self.residual(filled.clone(), known, up) + filled
             }
         }
     }
 
-    /// What the network adds to a filled grid: `[batch, 3, 64, 64]`, `[batch, 1, 64, 64] -> [batch, 3, 64, 64]`.
-    pub fn residual(&self, filled: Tensor<B, 4>, known: Tensor<B, 4>) -> Tensor<B, 4> {
-        self.forward(Tensor::cat(vec![filled * INPUT_SCALE, known], 1)) * OUTPUT_SCALE
+    /// What the network adds to a filled grid: `[batch, 3, 64, 64]`, `[batch, 1, 64, 64]`, up as [`Sight`]'s `-> [batch, 3, 64, 64]`.
+    pub fn residual(
+        &self,
+        filled: Tensor<B, 4>,
+        known: Tensor<B, 4>,
+        up: Option<Tensor<B, 2>>,
+    ) -> Tensor<B, 4> {
+        let [batch, _, height, width] = filled.dims();
+        let mut channels = vec![filled * INPUT_SCALE, known];
+        channels.extend(up.map(|up| {
+            let up = up.reshape([batch, 3, 1, 1]);
+            up.repeat_dim(2, height).repeat_dim(3, width)
+        }));
+        self.forward(Tensor::cat(channels, 1)) * OUTPUT_SCALE
     }
 
-    /// The bare network: `[batch, 4, 64, 64] -> [batch, 3, 64, 64]`, both O(1).
+    /// The bare network: `[batch, 4 or 7, 64, 64] -> [batch, 3, 64, 64]`, both O(1).
     pub fn forward(&self, x: Tensor<B, 4>) -> Tensor<B, 4> {
         let mut skips = Vec::with_capacity(self.down.len());
         let mut x = x;

@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::grid::{CELLS, NormalGrid, SIDE, neighbour_pairs};
 use crate::net::symmetry::origins;
-use crate::net::{Frame, FrameKind, InputKind, UnetConfig, plate};
+use crate::net::{Frame, InputKind, UnetConfig, plate};
 use crate::scarffolds::samples::Sample;
 
 /// Share of samples whose known cells are noisy.
@@ -34,6 +34,8 @@ const AHEAD: usize = 2;
 pub struct Prepared {
     /// What the network gets, its base included.
     pub input: NormalGrid,
+    /// Where +z of the sample is in the network's frame.
+    pub up: [f32; 3],
     /// The truth in the same units and frame; zero where not `valid`.
     pub truth: Vec<[f32; 3]>,
     /// Cells with a truth.
@@ -55,6 +57,8 @@ pub struct Batch {
     pub known: Vec<f32>,
     /// The fill under anchors, zero where there is none; `[count, 3, 64, 64]`.
     pub base: Vec<f32>,
+    /// Where +z of the sample is, `[count, 3]`.
+    pub up: Vec<f32>,
     /// `[count, 3, 64, 64]`.
     pub truth: Vec<f32>,
     /// Weight of each cell in the data loss, `[count, 1, 64, 64]`.
@@ -77,7 +81,7 @@ pub fn prepare(sample: &Sample, network: &UnetConfig) -> Option<Prepared> {
 pub fn augment(sample: &Sample, network: &UnetConfig, rng: &mut ChaCha8Rng) -> Option<Prepared> {
     let mut sample = symmetric(sample, rng.random_range(0..8));
     let scanned = sample.known.clone();
-    if network.frame == FrameKind::Canonical && rng.random() {
+    if network.frame.turns() && rng.random() {
         sample.truth.iter_mut().for_each(|p| p[0] = -p[0]);
     }
     if rng.random_bool(ANCHORED) {
@@ -160,6 +164,7 @@ fn prepare_noisy(
         .collect();
     Some(Prepared {
         input,
+        up: frame.up(),
         truth,
         valid: sample.valid.clone(),
         known: sample.known.clone(),
@@ -204,6 +209,7 @@ impl Batch {
                 batch.truth.extend(sample.truth.iter().map(|p| p[axis]));
             }
             batch.known.extend(&sample.input.known);
+            batch.up.extend(sample.up);
             for axis in 0..3 {
                 let base = sample.input.base.as_deref().unwrap_or(&NO_BASE);
                 batch.base.extend(base.iter().map(|p| p[axis]));
@@ -241,6 +247,7 @@ impl Batch {
             positions: part(&self.positions),
             known: part(&self.known),
             base: part(&self.base),
+            up: part(&self.up),
             truth: part(&self.truth),
             weight: part(&self.weight),
             hole: part(&self.hole),

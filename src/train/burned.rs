@@ -12,7 +12,7 @@ use super::student::{Learned, Snapshot, Student, terms};
 use super::{TrainError, TrainOptions};
 use crate::grid::{CELLS, SIDE};
 use crate::net::weights::{self, export};
-use crate::net::{Convolve, InputKind, Unet, UnetConfig, cells, over};
+use crate::net::{Convolve, FrameKind, InputKind, Sight, Unet, UnetConfig, cells, over};
 
 /// A network of burn's with its optimiser.
 #[derive(Debug)]
@@ -55,25 +55,27 @@ where
         rate: f64,
     ) -> Result<Learned, TrainError> {
         let device = B::Device::default();
-        let Inputs {
+        let Sight {
             positions,
             known,
             base,
-        } = Inputs::<B::InnerBackend>::of(&batch);
+            up,
+        } = sight::<B::InnerBackend>(&batch, self.config.frame);
         // The fill does not depend on the weights: it is computed outside the graph.
         let filled = match self.config.input {
-            InputKind::Zeros => positions,
-            InputKind::Membrane | InputKind::Plate => over(Some(base), positions, known.clone()),
+            InputKind::Zeros => positions * known.clone(),
+            InputKind::Membrane | InputKind::Plate => over(base, positions, known.clone()),
         };
         let (filled, known) = (
             Tensor::<B, 4>::from_inner(filled),
             Tensor::from_inner(known),
         );
+        let added = self
+            .network
+            .residual(filled.clone(), known, up.map(Tensor::from_inner));
         let predicted = match self.config.input {
-            InputKind::Zeros => self.network.predict(InputKind::Zeros, filled, known, None),
-            InputKind::Membrane | InputKind::Plate => {
-                self.network.residual(filled.clone(), known) + filled
-            }
+            InputKind::Zeros => added,
+            InputKind::Membrane | InputKind::Plate => added + filled,
         };
         let loss = loss(predicted, &Target::of(batch, &device), &options.loss);
         let terms = terms(&loss);
@@ -105,53 +107,45 @@ where
     }
 
     fn predictions(&self, samples: &[Prepared]) -> Result<Vec<Vec<[f32; 3]>>, TrainError> {
-        Ok(answers(samples, |x: Inputs<B::InnerBackend>| {
-            self.averaged
-                .predict(self.config.input, x.positions, x.known, Some(x.base))
+        Ok(answers(samples, |batch| {
+            let sight = sight::<B::InnerBackend>(batch, self.config.frame);
+            self.averaged.predict(self.config.input, sight)
         }))
     }
 }
 
-/// What a batch shows the network.
-struct Inputs<B: Backend> {
-    /// `[count, 3, 64, 64]`.
-    positions: Tensor<B, 4>,
-    /// `[count, 1, 64, 64]`.
-    known: Tensor<B, 4>,
-    /// `[count, 3, 64, 64]`.
-    base: Tensor<B, 4>,
-}
-
-impl<B: Backend> Inputs<B> {
-    fn of(batch: &Batch) -> Self {
-        let device = B::Device::default();
-        let tensor = |values: &[f32], channels: usize| {
-            Tensor::from_data(
-                TensorData::new(values.to_vec(), [batch.count, channels, SIDE, SIDE]),
-                &device,
-            )
-        };
-        Inputs {
-            positions: tensor(&batch.positions, 3),
-            known: tensor(&batch.known, 1),
-            base: tensor(&batch.base, 3),
-        }
+/// What a batch shows a network of this frame.
+fn sight<B: Backend>(batch: &Batch, frame: FrameKind) -> Sight<B> {
+    let device = B::Device::default();
+    let tensor = |values: &[f32], channels: usize| {
+        Tensor::from_data(
+            TensorData::new(values.to_vec(), [batch.count, channels, SIDE, SIDE]),
+            &device,
+        )
+    };
+    let up = (frame == FrameKind::Hanging).then(|| batch.up.clone());
+    Sight {
+        positions: tensor(&batch.positions, 3),
+        known: tensor(&batch.known, 1),
+        base: Some(tensor(&batch.base, 3)),
+        up: up.map(|up| Tensor::from_data(TensorData::new(up, [batch.count, 3]), &device)),
     }
 }
 
 /// What the network sees in unknown cells, as an answer, for comparison.
 pub fn input_fill<B: Backend>(samples: &[Prepared]) -> Vec<Vec<[f32; 3]>> {
-    answers(samples, |x: Inputs<B>| {
-        over(Some(x.base), x.positions, x.known)
+    answers(samples, |batch| {
+        let sight = sight::<B>(batch, FrameKind::Canonical);
+        over(sight.base, sight.positions, sight.known)
     })
 }
 
 fn answers<B: Backend>(
     samples: &[Prepared],
-    answer: impl Fn(Inputs<B>) -> Tensor<B, 4>,
+    answer: impl Fn(&Batch) -> Tensor<B, 4>,
 ) -> Vec<Vec<[f32; 3]>> {
     let chunks = samples.chunks(8).flat_map(|chunk| {
-        let planes: Vec<f32> = answer(Inputs::of(&Batch::of(chunk)))
+        let planes: Vec<f32> = answer(&Batch::of(chunk))
             .into_data()
             .convert::<f32>()
             .into_vec()

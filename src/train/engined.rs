@@ -16,7 +16,7 @@ use super::{TrainError, TrainOptions};
 use crate::grid::{CELLS, SIDE};
 use crate::net::engine::{Engine, EngineError, Input, Lessons, Options, Scratch};
 use crate::net::weights::NamedTensors;
-use crate::net::{UnetConfig, cells};
+use crate::net::{FrameKind, UnetConfig, cells};
 
 type B = Autodiff<Flex>;
 
@@ -39,6 +39,15 @@ impl Engined {
             ..Options::default()
         };
         Engine::new(tensors, &self.config, options)
+    }
+
+    fn input<'a>(&self, batch: &'a Batch) -> Input<'a> {
+        Input {
+            positions: &batch.positions,
+            known: &batch.known,
+            base: Some(&batch.base),
+            up: (self.config.frame == FrameKind::Hanging).then_some(&batch.up),
+        }
     }
 
     /// AdamW on all tensors that have a gradient; returns the gradient's norm before clipping.
@@ -120,11 +129,7 @@ impl Student for Engined {
         rate: f64,
     ) -> Result<Learned, TrainError> {
         let engine = self.engine(&self.network)?;
-        let input = Input {
-            positions: &batch.positions,
-            known: &batch.known,
-            base: Some(&batch.base),
-        };
+        let input = self.input(&batch);
         let count = batch.count;
         let said = Mutex::new(vec![[0.0; 5]; count]);
         let lesson = |grids: Range<usize>, predictions: &[f32], by: &mut [f32]| {
@@ -163,11 +168,7 @@ impl Student for Engined {
     fn predictions(&self, samples: &[Prepared]) -> Result<Vec<Vec<[f32; 3]>>, TrainError> {
         let engine = self.engine(&self.averaged)?;
         let batch = Batch::of(samples);
-        let input = Input {
-            positions: &batch.positions,
-            known: &batch.known,
-            base: Some(&batch.base),
-        };
+        let input = self.input(&batch);
         let mut out = vec![0.0; batch.positions.len()];
         engine.predict(&mut Scratch::default(), input, &mut out)?;
         Ok(out.chunks_exact(3 * CELLS).map(cells).collect())

@@ -26,7 +26,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use crate::net::engine::EngineError;
-use crate::net::{FrameKind, NetError, UnetConfig};
+use crate::net::{NetError, UnetConfig};
 use crate::scarffolds;
 use crate::scarffolds::samples::{Sampler, Turning};
 
@@ -143,10 +143,10 @@ pub fn run(
     options: &TrainOptions,
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Summary, TrainError> {
-    // A network that sees the given frame learns which way is up; in the canonical one the turning is undone anyway.
-    let turning = match options.network.frame {
-        FrameKind::Given => Turning::Upright,
-        FrameKind::Canonical => Turning::Any,
+    // In the canonical frame the turning is undone anyway.
+    let turning = match options.network.frame.knows_up() {
+        true => Turning::Upright,
+        false => Turning::Any,
     };
     let train = sampler(&options.sheets, turning)?;
     let held = sampler(&options.held_out, turning)?;

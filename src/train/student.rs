@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 use super::batch::{Batch, Prepared};
 use super::loss::Loss;
 use super::{TrainError, TrainOptions};
-use crate::net::UnetConfig;
 use crate::net::weights::{self, NamedTensors, export};
 
 /// What computes the steps.
@@ -115,17 +114,17 @@ fn given(options: &TrainOptions) -> Result<NamedTensors, TrainError> {
     })?;
     let (card, mut tensors) = weights::read(&bytes)?;
     weights::check(&card, &tensors)?;
-    let same = UnetConfig {
-        input: options.network.input,
-        ..card.architecture
-    };
-    if same != options.network {
+    if card.architecture.width != options.network.width {
         return Err(TrainError::Options(format!(
             "{} holds another architecture than the one to train",
             path.display()
         )));
     }
-    if card.architecture != options.network {
+    let [before, after] = [card.architecture, options.network].map(|net| net.frame.channels());
+    if before != after {
+        see(&mut tensors, [before, after]);
+    }
+    if card.architecture.input != options.network.input {
         // What it has learned to see stays of use; what is to be added to another fill is to be learned anew.
         let last = tensors
             .iter_mut()
@@ -133,6 +132,22 @@ fn given(options: &TrainOptions) -> Result<NamedTensors, TrainError> {
         last.for_each(|(_, (_, values))| values.fill(0.0));
     }
     Ok(tensors)
+}
+
+/// Lets a network see another number of channels: further ones mean nothing to it at first, the last ones are lost.
+fn see(tensors: &mut NamedTensors, [before, after]: [usize; 2]) {
+    let Some((shape, values)) = tensors.get_mut("down.0.conv0.weight") else {
+        return;
+    };
+    let taps: usize = shape[2..].iter().product();
+    let rows = values.chunks(before * taps);
+    let row = |row: &[f32]| {
+        let mut row = row.to_vec();
+        row.resize(after * taps, 0.0);
+        row
+    };
+    *values = rows.flat_map(row).collect();
+    shape[1] = after;
 }
 
 /// A loss's numbers.

@@ -41,8 +41,8 @@ impl Lane {
     fn new(engine: &Engine) -> Lane {
         let folds = &engine.folds;
         Lane {
-            forward: Activations::new(TOGETHER, folds, &engine.forward),
-            saved: Saved::new(TOGETHER, folds, &engine.forward),
+            forward: Activations::new(TOGETHER, folds, engine.forward()),
+            saved: Saved::new(TOGETHER, folds, engine.forward()),
             backward: Gradients::new(TOGETHER, folds, engine.reverse()),
             sums: WeightSums::new(TOGETHER, folds),
             room: Room::default(),
@@ -55,10 +55,10 @@ impl Lane {
             let grid = input.part(image..image + 1);
             let filled = image3_mut(out, image);
             enter(engine, &mut self.room, grid, filled);
-            lay_out((filled, grid.known), image, &mut self.forward.input);
+            lay_out((filled, grid), image, &mut self.forward.input);
         }
         let (forward, saved) = (&mut self.forward, &mut self.saved);
-        let features = forward.run(engine.target, images, &engine.forward, Some(saved));
+        let features = forward.run(engine.target, images, engine.forward(), Some(saved));
         for image in 0..images {
             engine.target.run(Last {
                 engine,
@@ -88,7 +88,7 @@ impl Lane {
         self.backward.run(
             target,
             images,
-            (&engine.forward, engine.reverse()),
+            (engine.forward(), engine.reverse()),
             (&self.forward, &self.saved),
             Some(&mut self.sums),
         );

@@ -90,7 +90,7 @@ pub struct Engine {
     target: Target,
     threads: usize,
     folds: Folds,
-    forward: Forward,
+    forward: OnceLock<Forward>,
     reverse: OnceLock<Reverse>,
 }
 
@@ -107,6 +107,8 @@ pub struct Input<'a> {
     pub known: &'a [f32],
     /// `[n, 3, 64, 64]`, for [`InputKind::Plate`](crate::net::InputKind); zero where there is none.
     pub base: Option<&'a [f32]>,
+    /// Where up is, `[n, 3]`, for [`FrameKind::Hanging`](crate::net::FrameKind); zero where there is none.
+    pub up: Option<&'a [f32]>,
 }
 
 /// Gradients of a prediction's planes times a cotangent, and the prediction.
@@ -120,7 +122,7 @@ pub struct Gradient<'a> {
 }
 
 impl Engine {
-    /// Folds batch norm into the weights and lays them out for the kernels.
+    /// Folds batch norm into the weights; they are laid out for the kernels when first wanted, or by [`Engine::prepare`].
     ///
     /// # Errors
     /// A tensor that is missing or has another shape, a width outside 1..=256, an instruction set that this CPU lacks.
@@ -137,13 +139,13 @@ impl Engine {
             Some(isa) => Target::new(isa).ok_or(EngineError::Isa { isa })?,
             None => Target::best(),
         };
-        let folds = Folds::read(tensors, width)?;
+        let folds = Folds::read(tensors, width, config.frame.channels())?;
         Ok(Engine {
             config: *config,
             target,
             threads: options.threads.max(1),
-            forward: Forward::pack(&folds),
             folds,
+            forward: OnceLock::new(),
             reverse: OnceLock::new(),
         })
     }
@@ -198,6 +200,16 @@ impl Engine {
         Ok(())
     }
 
+    /// Lays out the weights for the forward pass, so that the first prediction need not.
+    pub fn prepare(&self) {
+        self.forward();
+    }
+
+    /// The layers, prepared when first wanted.
+    fn forward(&self) -> &Forward {
+        self.forward.get_or_init(|| Forward::pack(&self.folds))
+    }
+
     /// The adjoint layers, prepared when first wanted.
     fn reverse(&self) -> &Reverse {
         self.reverse.get_or_init(|| Reverse::pack(&self.folds))
@@ -212,8 +224,17 @@ impl<'a> Input<'a> {
 
     fn check(&self) -> Result<(), EngineError> {
         let base = self.base.map_or(self.positions.len(), <[f32]>::len);
+        let (images, up) = (self.images(), self.up.map(<[f32]>::len));
+        if let Some(found) = up.filter(|found| *found != 3 * images) {
+            return Err(EngineError::Size {
+                what: "up",
+                found,
+                expected: 3 * images,
+                images,
+            });
+        }
         check(
-            self.images(),
+            images,
             [
                 ("known", self.known.len(), 1),
                 ("positions", self.positions.len(), 3),
@@ -229,6 +250,7 @@ impl<'a> Input<'a> {
             positions: &self.positions[three.clone()],
             known: &self.known[images.start * CELLS..images.end * CELLS],
             base: self.base.map(|base| &base[three]),
+            up: self.up.map(|up| &up[3 * images.start..3 * images.end]),
         }
     }
 }

@@ -50,7 +50,11 @@ impl Folds {
     ///
     /// # Errors
     /// The first tensor that is missing or has another shape.
-    pub fn read(tensors: &NamedTensors, width: usize) -> Result<Folds, EngineError> {
+    pub fn read(
+        tensors: &NamedTensors,
+        width: usize,
+        channels_seen: usize,
+    ) -> Result<Folds, EngineError> {
         let block = |name: String, from: usize, to: usize| -> Result<[Folded; 2], EngineError> {
             let half = |i: usize, from: usize| {
                 let (conv, norm) = (format!("{name}.conv{i}"), format!("{name}.norm{i}"));
@@ -59,7 +63,7 @@ impl Folds {
             Ok([half(0, from)?, half(1, to)?])
         };
         let channels = |level: usize| width << level;
-        let mut down = vec![block("down.0".into(), 4, width)?];
+        let mut down = vec![block("down.0".into(), channels_seen, width)?];
         for level in 1..=DOWN {
             let (from, to) = (channels(level - 1), channels(level));
             down.push(block(format!("down.{level}"), from, to)?);

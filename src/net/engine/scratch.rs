@@ -123,13 +123,13 @@ impl Lane {
     /// Predicts at most [`TOGETHER`] grids.
     fn predict(&mut self, engine: &Engine, input: Input, all: &mut [f32]) {
         let images = input.images();
-        let (target, network) = (engine.target, &engine.forward);
+        let (target, network) = (engine.target, engine.forward());
         let room = Lane::room(&mut self.forward, engine, images);
         for image in 0..images {
             let grid = input.part(image..image + 1);
             let out = image3_mut(all, image);
             enter(engine, &mut self.fill, grid, out);
-            lay_out((out, grid.known), image, &mut room.input);
+            lay_out((out, grid), image, &mut room.input);
         }
         let features = room.run(target, images, network, None);
         for image in 0..images {
@@ -151,7 +151,7 @@ impl Lane {
         out: Gradient,
     ) {
         let images = input.images();
-        let (target, network, reverse) = (engine.target, &engine.forward, engine.reverse());
+        let (target, network, reverse) = (engine.target, engine.forward(), engine.reverse());
         let room = Lane::room(&mut self.forward, engine, images);
         let fits = |(_, gradients): &(Saved, Gradients)| gradients.images() >= images;
         if !self.backward.as_ref().is_some_and(fits) {
@@ -167,7 +167,7 @@ impl Lane {
             let grid = input.part(image..image + 1);
             let filled = image3_mut(out.prediction, image);
             enter(engine, &mut self.fill, grid, filled);
-            lay_out((filled, grid.known), image, &mut room.input);
+            lay_out((filled, grid), image, &mut room.input);
         }
         let features = room.run(target, images, network, Some(saved));
         for image in 0..images {
@@ -222,7 +222,9 @@ impl Lane {
         images: usize,
     ) -> &'a mut Activations {
         let old = room.take().filter(|room| room.images >= images);
-        room.insert(old.unwrap_or_else(|| Activations::new(images, &engine.folds, &engine.forward)))
+        room.insert(
+            old.unwrap_or_else(|| Activations::new(images, &engine.folds, engine.forward())),
+        )
     }
 }
 
@@ -262,15 +264,17 @@ fn off_base<'a>(grid: Input<'a>, off: &'a mut Vec<f32>) -> &'a [f32] {
     off
 }
 
-/// Three planes, scaled, and the mask as the channels of one panel.
-pub fn lay_out((filled, known): (&[f32], &[f32]), image: usize, input: &mut Map) {
+/// Three planes, scaled, the mask, and where up is as the channels of one panel.
+pub fn lay_out((filled, grid): (&[f32], Input), image: usize, input: &mut Map) {
+    let up = grid.up.and_then(<[f32]>::first_chunk).unwrap_or(&[0.0; 3]);
     for row in 0..SIDE {
         for (column, to) in input.row_mut([image, 0], row).iter_mut().enumerate() {
             let cell = row * SIDE + column;
             for axis in 0..3 {
                 to.0[axis] = filled[axis * CELLS + cell] * INPUT_SCALE;
             }
-            to.0[3] = known[cell];
+            to.0[3] = grid.known[cell];
+            to.0[4..7].copy_from_slice(up);
         }
     }
 }

@@ -141,6 +141,7 @@ fn input<'a>(positions: &'a [f32], known: &'a [f32]) -> Input<'a> {
         positions,
         known,
         base: None,
+        up: None,
     }
 }
 
