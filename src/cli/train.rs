@@ -35,6 +35,9 @@ pub struct Args {
     /// Samples a step
     #[arg(long, default_value_t = TrainOptions::default().batch)]
     batch: usize,
+    /// Sheets drawn for a sample to learn from, of which the roughest is taken: most sheets are gentle
+    #[arg(long, value_name = "N", default_value_t = TrainOptions::default().roughest_of)]
+    roughest_of: usize,
     /// Highest learning rate
     #[arg(long, default_value_t = TrainOptions::default().rate)]
     rate: f64,
@@ -150,6 +153,7 @@ impl Args {
             },
             loss: self.loss.weights(),
             batch: self.batch,
+            roughest_of: self.roughest_of,
             rate: self.rate,
             minutes: self.minutes,
             every: self.every,

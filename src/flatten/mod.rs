@@ -91,7 +91,7 @@ impl Chart {
 /// Flattens a region by ARAP (Liu et al. 2008; paper eq. 1) from the cloth unfolded face by face; where that flips faces, from Tutte's
 /// embedding; where that does, too, by the symmetric Dirichlet energy.
 ///
-/// Lengths are those of the cloth without the scanner's noise. Nothing is pinned but the rigid motion. Holes are open: their shape in the plane follows from the cloth around them.
+/// Nothing is pinned but the rigid motion. Holes are open: their shape in the plane follows from the cloth around them.
 ///
 /// # Errors
 /// `Singular` for degenerate triangles, `TooStretched` and `Flipped` when the surface is too far from developable.

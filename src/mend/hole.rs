@@ -112,6 +112,12 @@ fn patch_report(patch: &Patch, quality: &Quality) -> v1::PatchReport {
 /// What a person should look at before trusting the patch.
 fn notes(prepared: &Prepared, quality: &Quality) -> Vec<String> {
     let mut notes = Vec::new();
+    if prepared.denoised {
+        notes.push(
+            "the scan is noisy: the cloth around the hole was seen without that noise, its rim was kept"
+                .into(),
+        );
+    }
     if prepared.chart.stretch_max > SUSPICIOUS {
         notes.push(format!(
             "the cloth around the hole does not lie flat well: an edge is stretched {:.2} times",

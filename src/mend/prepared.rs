@@ -10,6 +10,7 @@ use crate::contract::v1;
 use crate::edit::{HoleCells, Reach};
 use crate::flatten::{self, Chart};
 use crate::grid::{self, CELLS, Grid, NormalGrid, Normalisation};
+use crate::mesh::denoise::{Filter, denoised};
 use crate::mesh::region::{self, Region};
 use crate::mesh::{Vec2, Vec3};
 use crate::net;
@@ -52,6 +53,8 @@ pub struct Prepared {
     pub timings: v1::HoleTimings,
     /// A smooth fill of the grid, network's units.
     base: Option<Vec<[f32; 3]>>,
+    /// Whether the scanner's noise was taken off the cloth that the network saw.
+    pub denoised: bool,
     polygon: Vec<Vec2>,
     unedited: Mutex<Vec<(Voice, Arc<Unedited>)>>,
 }
@@ -199,6 +202,8 @@ impl Prepared {
 /// Cloth around a hole, laid flat.
 struct Laid {
     region: Region,
+    /// The region without the scanner's noise, where there is some.
+    smooth: Option<Region>,
     chart: Chart,
     timings: v1::HoleTimings,
 }
@@ -239,7 +244,12 @@ impl Laid {
         .map_err(|source| MendError::Region { hole, source })?;
         let grown = milliseconds(started);
         let started = Instant::now();
-        let chart = flatten::flatten(&region, &limits.flatten)
+        let smooth = denoised(&region.mesh, &Filter::default()).map(|mesh| Region {
+            mesh,
+            ..region.clone()
+        });
+        let seen = smooth.as_ref().unwrap_or(&region);
+        let chart = flatten::flatten(seen, &limits.flatten)
             .map_err(|source| MendError::Flatten { hole, source })?;
         let timings = v1::HoleTimings {
             region: grown,
@@ -248,6 +258,7 @@ impl Laid {
         };
         Ok(Laid {
             region,
+            smooth,
             chart,
             timings,
         })
@@ -262,7 +273,8 @@ impl Laid {
     /// Samples the grid and plans the patch.
     fn sampled(self, id: u32, limits: &Limits) -> Result<Prepared, MendError> {
         let started = Instant::now();
-        let grid = flatten::raster(&self.region.mesh, &self.chart);
+        let seen = self.smooth.as_ref().unwrap_or(&self.region);
+        let grid = flatten::raster(&seen.mesh, &self.chart);
         let normal = grid.normalisation().ok_or(MendError::TooLittleKnown {
             hole: id,
             known: grid.known_count(),
@@ -274,13 +286,18 @@ impl Laid {
         let raster = milliseconds(started);
 
         let started = Instant::now();
-        let plan = patch::plan(&self.region, &self.chart, &limits.patch)
+        let plan = patch::plan(seen, &self.chart, &limits.patch)
+            .and_then(|plan| match &self.smooth {
+                Some(_) => plan.joining(&self.region.mesh.positions),
+                None => Ok(plan),
+            })
             .map_err(|source| MendError::Patch { hole: id, source })?;
         let timings = v1::HoleTimings {
             raster,
             patch: milliseconds(started),
             ..self.timings
         };
+        let denoised = self.smooth.is_some();
         let Laid { region, chart, .. } = self;
         let rim = region.rim.iter().map(|v| {
             let at = *v as usize;
@@ -297,6 +314,7 @@ impl Laid {
             report,
             timings,
             base,
+            denoised,
             polygon,
             unedited: Mutex::default(),
             region,

@@ -5,6 +5,7 @@
 mod boxes;
 mod collar;
 pub mod curvature;
+pub mod denoise;
 pub mod geodesic;
 mod growth;
 pub mod intersect;

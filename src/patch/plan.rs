@@ -18,6 +18,8 @@ pub struct Plan {
     rim: Vec<u32>,
     /// Positions of the rim.
     own: Vec<Vec3>,
+    /// What is added to all vertices in the end, where the cloth is to join a rim that lies elsewhere.
+    shift: Option<Vec<Vec3>>,
     tiled: Triangulation,
     seam: Extension,
     hem: Hem,
@@ -35,7 +37,7 @@ pub fn plan(region: &Region, chart: &Chart, options: &Options) -> Result<Plan, P
     let polygon: Vec<Vec2> = rim.iter().map(|v| chart.flat[*v as usize]).collect();
     let polygon = untangle::untangled(&polygon).ok_or(PatchError::RimCrosses)?;
     let mut tiled =
-        triangulate::triangulate(&polygon, median_edge(region, chart), options.most_vertices)?;
+        triangulate::triangulate(&polygon, spacing(region, chart), options.most_vertices)?;
     split_taken_chords(&mut tiled, &rim, region);
 
     let own: Vec<Vec3> = (rim.iter())
@@ -49,6 +51,7 @@ pub fn plan(region: &Region, chart: &Chart, options: &Options) -> Result<Plan, P
     Ok(Plan {
         rim,
         own,
+        shift: None,
         tiled,
         seam,
         hem,
@@ -58,6 +61,20 @@ pub fn plan(region: &Region, chart: &Chart, options: &Options) -> Result<Plan, P
 }
 
 impl Plan {
+    /// Joins the scan where its vertices really lie, when the region was one without the scanner's noise: the cloth is made without it,
+    /// and what the rim is off by is spread harmonically.
+    ///
+    /// # Errors
+    /// `Singular` when triangles degenerate.
+    pub fn joining(mut self, positions: &[Vec3]) -> Result<Plan, PatchError> {
+        let gaps: Vec<[f64; 3]> = (self.rim.iter().zip(&self.own))
+            .map(|(v, own)| (positions[*v as usize] - own).into())
+            .collect();
+        let spread = self.seam.extend(&gaps).map_err(|_| singular("seam"))?;
+        self.shift = Some(spread.into_iter().map(Vec3::from).collect());
+        Ok(self)
+    }
+
     /// All vertices in the plane of the chart, scene units; the rim's come first.
     pub fn flat(&self) -> &[Vec2] {
         &self.tiled.points
@@ -77,6 +94,7 @@ impl Plan {
     pub fn bytes(&self) -> usize {
         size_of_val(&self.rim[..])
             + size_of_val(&self.own[..])
+            + self.shift.as_ref().map_or(0, |s| size_of_val(&s[..]))
             + size_of_val(&self.tiled.points[..])
             + size_of_val(&self.tiled.faces[..])
             + self.seam.bytes()
@@ -126,6 +144,9 @@ impl Plan {
             patch.strain_rounds += rounds.map_err(|_| singular("strain"))?;
             patch.positions = self.with_rim(&positions);
             patch.collisions += self.surroundings.separate(&mut patch);
+        }
+        for (p, shift) in patch.positions.iter_mut().zip(self.shift.iter().flatten()) {
+            *p += shift;
         }
         Ok(patch)
     }
@@ -179,10 +200,15 @@ impl Plan {
     fn grips(&self, pulls: &[Pull]) -> Vec<Grip> {
         let grip = |pull: &Pull| {
             let (face, weights) = locate(&self.tiled.points, &self.tiled.faces, pull.at)?;
-            let corners = self.tiled.faces[face].map(|v| self.hem.place(v) as usize);
+            let face = self.tiled.faces[face];
+            let corners = face.map(|v| self.hem.place(v) as usize);
+            let shift = self.shift.as_ref().map_or(Vec3::zeros(), |shift| {
+                let each = face.iter().zip(&weights);
+                each.map(|(v, w)| shift[*v as usize] * *w).sum()
+            });
             Some(Grip {
                 corners: std::array::from_fn(|k| (corners[k], weights[k])),
-                to: pull.to,
+                to: pull.to - shift,
                 hold: pull.hold,
             })
         };
@@ -268,6 +294,19 @@ fn split_taken_chords(tiled: &mut Triangulation, rim: &[u32], region: &Region) {
         edges.binary_search(&(a.min(b), a.max(b))).is_ok()
     });
 }
+
+/// Edge length of a patch, in the plane: as fine as the grid that is drawn from, so that no fold drawn there is cut short, but between half
+/// the scan's own resolution and all of it.
+fn spacing(region: &Region, chart: &Chart) -> f64 {
+    let (edge, cell) = (
+        median_edge(region, chart),
+        chart.frame.side / grid::SIDE as f64,
+    );
+    cell.clamp(FINER * edge, edge)
+}
+
+/// How much finer than the scan a patch may be.
+const FINER: f64 = 0.5;
 
 /// Median edge length of the region in the plane: the scan's own resolution.
 fn median_edge(region: &Region, chart: &Chart) -> f64 {

@@ -37,7 +37,11 @@ pub enum Turning {
 #[derive(Debug, Clone)]
 pub struct Sampler {
     splines: Vec<Spline>,
+    /// By sheet: see [`Sheet::roughness`].
+    roughness: Vec<f32>,
     turning: Turning,
+    /// Sheets drawn for a sample, of which the roughest is taken.
+    candidates: usize,
 }
 
 /// Share of samples whose region ends at a distance from the hole; the others fill the grid or end at the sheet's border only.
@@ -56,7 +60,17 @@ impl Sampler {
         assert!(!sheets.is_empty(), "a sampler needs sheets");
         Self {
             splines: sheets.iter().map(Spline::new).collect(),
+            roughness: sheets.iter().map(Sheet::roughness).collect(),
             turning,
+            candidates: 1,
+        }
+    }
+
+    /// The same, with every sample from the roughest of so many sheets: most sheets of a folder are gentle, and little is learned there.
+    pub fn roughest_of(self, candidates: usize) -> Self {
+        Self {
+            candidates: candidates.max(1),
+            ..self
         }
     }
 
@@ -67,8 +81,12 @@ impl Sampler {
 
     /// Draws a sample from any sheet.
     pub fn sample(&self, rng: &mut impl Rng) -> Sample {
-        let sheet = rng.random_range(0..self.splines.len());
-        self.sample_of(sheet, rng)
+        let drawn = (0..self.candidates).map(|_| rng.random_range(0..self.splines.len()));
+        let drawn: Vec<usize> = drawn.collect();
+        let roughest = drawn
+            .iter()
+            .max_by(|a, b| self.roughness[**a].total_cmp(&self.roughness[**b]));
+        self.sample_of(roughest.copied().unwrap_or(0), rng)
     }
 
     /// Draws a sample from sheet number `sheet`: for held-out sets in which every sheet has its turn.

@@ -12,6 +12,7 @@ pub use super::files::{read, read_manifest};
 use super::scene::Scene;
 use crate::mesh::intersect::self_intersections;
 use crate::mesh::{TriMesh, Vec3};
+use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -36,6 +37,20 @@ pub struct Sheet {
 }
 
 impl Sheet {
+    /// Root mean square of the angle between an edge and the next one along its row or column, radians.
+    pub fn roughness(&self) -> f32 {
+        let at = |i: usize, j: usize| Vector3::from(self.positions[j * SIDE + i]);
+        let bend = |a: Vector3<f32>, b: Vector3<f32>, c: Vector3<f32>| (b - a).angle(&(c - b));
+        let mut squares = 0.0;
+        for j in 0..SIDE {
+            for i in 0..SIDE - 2 {
+                squares += bend(at(i, j), at(i + 1, j), at(i + 2, j)).powi(2);
+                squares += bend(at(j, i), at(j, i + 1), at(j, i + 2)).powi(2);
+            }
+        }
+        (squares / (2 * SIDE * (SIDE - 2)) as f32).sqrt()
+    }
+
     /// The sheet as 5,000 triangles; every cell is split along the diagonal from `(i, j)` to `(i + 1, j + 1)`.
     pub fn mesh(&self) -> TriMesh {
         let side = SIDE as u32;

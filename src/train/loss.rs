@@ -56,10 +56,11 @@ impl Default for LossWeights {
 }
 
 impl LossWeights {
-    /// The default with a repulsion that is felt: a hole cell half the reach away from another layer costs about as much as one 0.75 cells off.
+    /// The default with a repulsion that is felt: a hole cell half the reach away from another layer costs as much as one 8 cells off. With a
+    /// weight of 1 the network cuts itself as often as without.
     pub fn interpen() -> Self {
         LossWeights {
-            self_penetration: 1.0,
+            self_penetration: 30.0,
             ..LossWeights::default()
         }
     }

@@ -92,6 +92,9 @@ pub struct TrainOptions {
     pub loss: LossWeights,
     /// Samples a step.
     pub batch: usize,
+    /// Sheets drawn for a sample to learn from, of which the roughest is taken.
+    #[serde(default = "one")]
+    pub roughest_of: usize,
     /// Highest learning rate.
     pub rate: f64,
     /// How long; the learning rate falls to zero at the end.
@@ -102,6 +105,10 @@ pub struct TrainOptions {
     pub seed: u64,
     /// Threads that make samples.
     pub sample_threads: usize,
+}
+
+fn one() -> usize {
+    1
 }
 
 /// Where a run starts.
@@ -126,6 +133,7 @@ impl Default for TrainOptions {
             network: UnetConfig::default(),
             loss: LossWeights::default(),
             batch: 16,
+            roughest_of: 1,
             rate: 1e-3,
             minutes: 60.0,
             every: 5.0,
@@ -148,8 +156,8 @@ pub fn run(
         true => Turning::Upright,
         false => Turning::Any,
     };
-    let train = sampler(&options.sheets, turning)?;
-    let held = sampler(&options.held_out, turning)?;
+    let train = sampler(&options.sheets, turning, options.roughest_of)?;
+    let held = sampler(&options.held_out, turning, 1)?;
     let mut rng = ChaCha8Rng::seed_from_u64(HELD_OUT_SEED);
     let held_out = (0..HELD_OUT_SAMPLES).map(|_| held(&mut rng)).collect();
     let data_seed = scarffolds::sheets::read_manifest(&options.sheets)
@@ -168,7 +176,7 @@ pub fn run(
 
 type Source = Arc<dyn Fn(&mut ChaCha8Rng) -> Sample + Send + Sync>;
 
-fn sampler(dir: &Path, turning: Turning) -> Result<Source, TrainError> {
+fn sampler(dir: &Path, turning: Turning, roughest_of: usize) -> Result<Source, TrainError> {
     let refuse = |reason: String| TrainError::Sheets {
         path: dir.to_owned(),
         reason,
@@ -177,6 +185,6 @@ fn sampler(dir: &Path, turning: Turning) -> Result<Source, TrainError> {
     if sheets.is_empty() {
         return Err(refuse("there are none".into()));
     }
-    let sampler = Sampler::new(&sheets, turning);
+    let sampler = Sampler::new(&sheets, turning).roughest_of(roughest_of);
     Ok(Arc::new(move |rng| sampler.sample(rng)))
 }
