@@ -25,9 +25,9 @@ pub(super) struct Surroundings {
 }
 
 /// Most rounds of pushing.
-const ROUNDS: usize = 60;
+const ROUNDS: usize = 100;
 /// Push of one round, in mean edges.
-const PUSH: f64 = 0.2;
+const PUSH: f64 = 0.35;
 /// Sweeps of length correction after each push.
 const SWEEPS: usize = 4;
 /// Lengths within 1 ± this are left alone while pushing.
