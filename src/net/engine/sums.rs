@@ -179,19 +179,19 @@ fn some<'a, S: Simd, const M: usize, const K: usize>(
     sums: &mut [Block; LANES],
 ) {
     let mut held = [s.splat(0.0); M];
-    for m in 0..M {
-        held[m] = s.load(&sums[K + m]);
+    for (held, sum) in held.iter_mut().zip(&sums[K..]) {
+        *held = s.load(sum);
     }
     for (x, by) in cells {
         for (x, by) in x.iter().zip(by) {
             let by = s.load(by);
-            for m in 0..M {
-                held[m] = s.mul_add(s.splat(x.0[K + m]), by, held[m]);
+            for (held, x) in held.iter_mut().zip(&x.0[K..]) {
+                *held = s.mul_add(s.splat(*x), by, *held);
             }
         }
     }
-    for m in 0..M {
-        s.store(held[m], &mut sums[K + m]);
+    for (held, sum) in held.into_iter().zip(&mut sums[K..]) {
+        s.store(held, sum);
     }
 }
 
