@@ -1,7 +1,5 @@
 //! The network's weights, ready for the kernels: read and folded once, forward layers at load, adjoint ones when first wanted.
 
-use rayon::prelude::*;
-
 use super::EngineError;
 use super::gate::{Gate, GateAdjoint};
 use super::pack::{Folded, Layer, Parts, Plan, Turn, tensor};
@@ -123,7 +121,8 @@ impl GateFolds {
     }
 }
 
-/// The forward pass's layers.
+/// The forward pass's layers. Packed on one thread: the first to ask may be a thread of a pool, and one that waits for others there may be
+/// given work that asks again.
 #[derive(Debug)]
 pub struct Forward {
     pub down: Vec<[Layer; 2]>,
@@ -142,17 +141,16 @@ impl Forward {
     pub fn pack(folds: &Folds) -> Forward {
         let block = |level: usize, [first, second]: &[Folded; 2], parts: usize| {
             let (plan, to) = (Plan::of_side(side(level)), Parts(first.to));
-            let (first, second) = rayon::join(
-                || Layer::pack(plan, first, [Parts(parts), to]),
-                || Layer::pack(plan, second, [to, to]),
-            );
-            [first, second]
+            [
+                Layer::pack(plan, first, [Parts(parts), to]),
+                Layer::pack(plan, second, [to, to]),
+            ]
         };
         Forward {
-            down: (folds.down.par_iter().enumerate())
+            down: (folds.down.iter().enumerate())
                 .map(|(level, convs)| block(level, convs, convs[0].from))
                 .collect(),
-            up: (folds.up.par_iter().enumerate())
+            up: (folds.up.iter().enumerate())
                 .map(|(level, up)| UpLayers {
                     conv: Layer::pack(Plan::Up, &up.conv, [Parts(up.conv.from), Parts(up.conv.to)]),
                     gate: Gate::pack(&up.gate),
@@ -182,17 +180,16 @@ impl Reverse {
     pub fn pack(folds: &Folds) -> Reverse {
         let block = |level: usize, [first, second]: &[Folded; 2], parts: usize| {
             let (plan, from) = (Plan::of_side(side(level)), Parts(first.to));
-            let (first, second) = rayon::join(
-                || Layer::pack(plan, &first.adjoint(Turn::Half), [from, Parts(parts)]),
-                || Layer::pack(plan, &second.adjoint(Turn::Half), [from, from]),
-            );
-            [first, second]
+            [
+                Layer::pack(plan, &first.adjoint(Turn::Half), [from, Parts(parts)]),
+                Layer::pack(plan, &second.adjoint(Turn::Half), [from, from]),
+            ]
         };
         Reverse {
-            down: (folds.down.par_iter().enumerate())
+            down: (folds.down.iter().enumerate())
                 .map(|(level, convs)| block(level, convs, convs[0].from))
                 .collect(),
-            up: (folds.up.par_iter().enumerate())
+            up: (folds.up.iter().enumerate())
                 .map(|(level, up)| UpReverse {
                     conv: Layer::pack(
                         Plan::Down,
