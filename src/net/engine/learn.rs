@@ -24,7 +24,7 @@ pub struct Lessons {
 }
 
 /// A loss, given which grids of the call it is about and their predictions `[n, 3, 64, 64]`: fills in its derivatives with respect to
-/// them. Called for some grids at a time, on any thread; what is learned is the sum.
+/// them. Called for some grids at a time, on the caller's thread; what is learned is the sum.
 pub type Lesson<'a> = dyn Fn(Range<usize>, &[f32], &mut [f32]) + Sync + 'a;
 
 /// What [`TOGETHER`] grids need.
@@ -118,16 +118,24 @@ impl Engine {
         lessons.predictions.resize(images * 3 * CELLS, 0.0);
         lessons.cotangents.resize(images * 3 * CELLS, 0.0);
         let size = TOGETHER * 3 * CELLS;
-        let grids =
-            (lessons.predictions.par_chunks_mut(size)).zip(lessons.cotangents.par_chunks_mut(size));
-        let numbered = lessons.lanes.par_iter_mut().zip(grids).enumerate();
-        numbered.for_each(|(place, (lane, (predictions, cotangents)))| {
-            let grids = place * TOGETHER..place * TOGETHER + predictions.len() / (3 * CELLS);
-            lane.predict(self, input.part(grids.clone()), predictions);
-            cotangents.fill(0.0);
-            lesson(grids, predictions, cotangents);
-            lane.differentiate(self, cotangents);
+        let of = |place: usize, values: &[f32]| {
+            place * TOGETHER..place * TOGETHER + values.len() / (3 * CELLS)
+        };
+        let parts = lessons.predictions.par_chunks_mut(size);
+        let numbered = lessons.lanes.par_iter_mut().zip(parts).enumerate();
+        numbered.for_each(|(place, (lane, out))| {
+            lane.predict(self, input.part(of(place, out)), out);
         });
+        // On this thread: a lesson may wait for locks, and a pool's thread that waits is given other work.
+        let parts = lessons.predictions.chunks(size);
+        let both = parts.zip(lessons.cotangents.chunks_mut(size));
+        for (place, (predictions, by)) in both.enumerate() {
+            by.fill(0.0);
+            lesson(of(place, predictions), predictions, by);
+        }
+        let parts = lessons.cotangents.par_chunks(size);
+        let lanes_with = lessons.lanes.par_iter_mut().zip(parts);
+        lanes_with.for_each(|(lane, by)| lane.differentiate(self, by));
         let (first, others) = lessons.lanes.split_at_mut(1);
         let sums = &mut first[0].sums;
         for other in others.iter().take(lanes.saturating_sub(1)) {
