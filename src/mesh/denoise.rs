@@ -5,6 +5,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use super::topology::corners_by_vertex;
 use super::{TriMesh, Vec3};
 
 /// Vertices that the level is estimated from, at most; evenly spread over the numbering.
@@ -41,10 +42,8 @@ impl Default for Filter {
 /// Same faces, same vertices, only their positions differ. Works on any mesh; O(vertices · rings²).
 pub fn denoised(mesh: &TriMesh, filter: &Filter) -> Option<TriMesh> {
     let around = Around::of(mesh);
-    let level = level(mesh, &around) / mean_edge(mesh);
-    // Also false for a mesh without edges.
-    let noisy = level > filter.clean && level.is_finite();
-    noisy.then(|| {
+    let level = level(mesh, &around);
+    (level > filter.clean && level.is_finite()).then(|| {
         let moved = (0..mesh.positions.len() as u32).map(|v| {
             let here = mesh.positions[v as usize];
             let wide = around.rings(mesh, v, filter.rings);
@@ -60,39 +59,23 @@ pub fn denoised(mesh: &TriMesh, filter: &Filter) -> Option<TriMesh> {
     })
 }
 
-/// Standard deviation of the noise across the surface, in mean edges; 0 for a mesh with no inner vertices.
-pub fn noise_level(mesh: &TriMesh) -> f64 {
-    level(mesh, &Around::of(mesh)) / mean_edge(mesh).max(f64::MIN_POSITIVE)
-}
-
-/// The faces around every vertex.
+/// The corners at every vertex; a corner's face is a third of its number.
 struct Around {
-    starts: Vec<usize>,
-    faces: Vec<u32>,
+    starts: Vec<u32>,
+    corners: Vec<u32>,
 }
 
 impl Around {
     fn of(mesh: &TriMesh) -> Around {
-        let mut starts = vec![0; mesh.positions.len() + 1];
-        for v in mesh.faces.as_flattened() {
-            starts[*v as usize + 1] += 1;
-        }
-        for v in 0..mesh.positions.len() {
-            starts[v + 1] += starts[v];
-        }
-        let mut fill = starts.clone();
-        let mut faces = vec![0; 3 * mesh.faces.len()];
-        for (f, face) in (0u32..).zip(&mesh.faces) {
-            for v in face {
-                faces[fill[*v as usize]] = f;
-                fill[*v as usize] += 1;
-            }
-        }
-        Around { starts, faces }
+        let (starts, corners) = corners_by_vertex(mesh.faces.as_flattened(), mesh.positions.len());
+        Around { starts, corners }
     }
 
-    fn faces_at(&self, vertex: u32) -> &[u32] {
-        &self.faces[self.starts[vertex as usize]..self.starts[vertex as usize + 1]]
+    /// The faces at a vertex, ascending.
+    fn faces_at(&self, vertex: u32) -> impl ExactSizeIterator<Item = u32> {
+        let v = vertex as usize;
+        let corners = &self.corners[self.starts[v] as usize..self.starts[v + 1] as usize];
+        corners.iter().map(|corner| corner / 3)
     }
 
     /// The vertices within so many edges of a vertex, itself included, ascending.
@@ -100,7 +83,7 @@ impl Around {
         let mut found = vec![vertex];
         for _ in 0..rings {
             let faces = found.iter().flat_map(|&v| self.faces_at(v));
-            let corners = faces.flat_map(|&f| mesh.faces[f as usize]);
+            let corners = faces.flat_map(|f| mesh.faces[f as usize]);
             let mut wider: Vec<u32> = corners.collect();
             wider.sort_unstable();
             wider.dedup();
@@ -110,7 +93,7 @@ impl Around {
     }
 }
 
-/// Standard deviation of the noise, scene units.
+/// Standard deviation of the noise across the surface, in mean edges; 0 for a mesh with no inner vertices.
 fn level(mesh: &TriMesh, around: &Around) -> f64 {
     let stride = (mesh.positions.len() / SAMPLES).max(1);
     let mut off: Vec<f64> = (0..mesh.positions.len() as u32)
@@ -121,7 +104,8 @@ fn level(mesh: &TriMesh, around: &Around) -> f64 {
         return 0.0;
     }
     let quarter = off.len() / 4;
-    *off.select_nth_unstable_by(quarter, f64::total_cmp).1 / (QUARTILE * OWN_AND_FIT)
+    let quartile = *off.select_nth_unstable_by(quarter, f64::total_cmp).1;
+    quartile / (QUARTILE * OWN_AND_FIT) / mean_edge(mesh).max(f64::MIN_POSITIVE)
 }
 
 /// How far an inner vertex lies from the quadric through the two rings around it, scene units; `None` at the border.
@@ -146,9 +130,9 @@ fn fitted(
 ) -> Option<(Vec3, f64)> {
     let centre = mesh.positions[vertex as usize];
     let place = |v: &u32| mesh.positions[*v as usize] - centre;
-    let faces = around.faces_at(vertex).iter();
+    let faces = around.faces_at(vertex);
     let normal = faces
-        .map(|&f| doubled_normal(mesh, f))
+        .map(|f| doubled_normal(mesh, f))
         .sum::<Vec3>()
         .try_normalize(0.0)?;
     let mut axis = Vec3::zeros();
@@ -189,6 +173,10 @@ mod tests {
 
     use super::*;
     use crate::mesh::shapes::{holed_sheet, shaken, sheet};
+
+    fn noise_level(mesh: &TriMesh) -> f64 {
+        level(mesh, &Around::of(mesh))
+    }
 
     fn waves(u: f64, v: f64) -> Vec3 {
         Vec3::new(u, v, 0.05 * (9.0 * u).sin() * (5.0 * v).cos())

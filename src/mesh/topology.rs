@@ -314,7 +314,8 @@ fn face_components(twin: &[u32]) -> (Vec<u32>, usize) {
     (component, count as usize)
 }
 
-fn corners_by_vertex(origins: &[u32], vertices: usize) -> (Vec<u32>, Vec<u32>) {
+/// For every vertex the first of its corners' places, and the corners, ascending.
+pub(super) fn corners_by_vertex(origins: &[u32], vertices: usize) -> (Vec<u32>, Vec<u32>) {
     let starts = bucket_starts(origins.iter().copied(), vertices);
     let mut fill = starts.clone();
     let mut around = vec![0; origins.len()];

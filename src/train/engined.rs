@@ -2,7 +2,6 @@
 //! means are over the few grids that go through the kernels together, not over the batch.
 
 use std::ops::Range;
-use std::sync::Mutex;
 
 use burn::backend::{Autodiff, Flex};
 use burn::tensor::{Tensor, TensorData};
@@ -131,22 +130,17 @@ impl Student for Engined {
         let engine = self.engine(&self.network)?;
         let input = self.input(&batch);
         let count = batch.count;
-        let said = Mutex::new(vec![[0.0; 5]; count]);
-        let lesson = |grids: Range<usize>, predictions: &[f32], by: &mut [f32]| {
-            let (first, share) = (grids.start, grids.len() as f32 / count as f32);
+        let mut terms = [0.0; 5];
+        let mut lesson = |grids: Range<usize>, predictions: &[f32], by: &mut [f32]| {
+            let share = grids.len() as f32 / count as f32;
             let target = Target::of(batch.part(grids), &Default::default());
-            let terms = slopes(predictions, &target, &options.loss, by);
+            let said = slopes(predictions, &target, &options.loss, by);
             by.iter_mut().for_each(|x| *x *= share);
-            if let Ok(mut said) = said.lock() {
-                said[first] = terms.map(|x| x * share);
-            }
+            let sums = terms.iter_mut().zip(said);
+            sums.for_each(|(sum, term)| *sum += term * share);
         };
         let lessons = &mut self.lessons;
-        let gradient = engine.learn(lessons, &self.network, input, &lesson)?;
-        let said = said.into_inner().unwrap_or_default();
-        let terms = said.iter().fold([0.0; 5], |sum, terms| {
-            std::array::from_fn(|i| sum[i] + terms[i])
-        });
+        let gradient = engine.learn(lessons, &self.network, input, &mut lesson)?;
         let norm = self.descend(&gradient, rate);
         self.average();
         Ok((terms, norm))

@@ -8,7 +8,7 @@ use super::backward::Gradients;
 use super::forward::{Activations, Saved};
 use super::network::{Folds, GateFolds};
 use super::pack::{EPSILON, Folded, tensor};
-use super::scratch::{Last, LastAdjoint, Room, TOGETHER, enter, image3, image3_mut, lay_out};
+use super::scratch::{LastAdjoint, Room, TOGETHER, image3, say, show};
 use super::sums::WeightSums;
 use super::{Engine, EngineError, Input};
 use crate::grid::CELLS;
@@ -25,7 +25,7 @@ pub struct Lessons {
 
 /// A loss, given which grids of the call it is about and their predictions `[n, 3, 64, 64]`: fills in its derivatives with respect to
 /// them. Called for some grids at a time, on the caller's thread; what is learned is the sum.
-pub type Lesson<'a> = dyn Fn(Range<usize>, &[f32], &mut [f32]) + Sync + 'a;
+pub type Lesson<'a> = dyn FnMut(Range<usize>, &[f32], &mut [f32]) + 'a;
 
 /// What [`TOGETHER`] grids need.
 #[derive(Debug)]
@@ -51,22 +51,15 @@ impl Lane {
 
     fn predict(&mut self, engine: &Engine, input: Input, out: &mut [f32]) {
         let images = input.images();
-        for image in 0..images {
-            let grid = input.part(image..image + 1);
-            let filled = image3_mut(out, image);
-            enter(engine, &mut self.room, grid, filled);
-            lay_out((filled, grid), image, &mut self.forward.input);
-        }
+        show(
+            engine,
+            &mut self.room,
+            input,
+            (out, &mut self.forward.input),
+        );
         let (forward, saved) = (&mut self.forward, &mut self.saved);
         let features = forward.run(engine.target, images, engine.forward(), Some(saved));
-        for image in 0..images {
-            engine.target.run(Last {
-                engine,
-                features,
-                image,
-                out: image3_mut(out, image),
-            });
-        }
+        (0..images).for_each(|image| say(engine, (features, image), out));
     }
 
     fn differentiate(&mut self, engine: &Engine, cotangents: &[f32]) {
@@ -107,7 +100,7 @@ impl Engine {
         lessons: &mut Lessons,
         tensors: &NamedTensors,
         input: Input,
-        lesson: &Lesson,
+        lesson: &mut Lesson,
     ) -> Result<NamedTensors, EngineError> {
         input.check()?;
         let images = input.images();

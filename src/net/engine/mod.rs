@@ -17,6 +17,8 @@ mod simd;
 mod sums;
 
 #[cfg(test)]
+mod learn_tests;
+#[cfg(test)]
 pub(super) mod reference;
 #[cfg(test)]
 mod tests;

@@ -125,21 +125,9 @@ impl Lane {
         let images = input.images();
         let (target, network) = (engine.target, engine.forward());
         let room = Lane::room(&mut self.forward, engine, images);
-        for image in 0..images {
-            let grid = input.part(image..image + 1);
-            let out = image3_mut(all, image);
-            enter(engine, &mut self.fill, grid, out);
-            lay_out((out, grid), image, &mut room.input);
-        }
+        show(engine, &mut self.fill, input, (all, &mut room.input));
         let features = room.run(target, images, network, None);
-        for image in 0..images {
-            target.run(Last {
-                engine,
-                features,
-                image,
-                out: image3_mut(all, image),
-            });
-        }
+        (0..images).for_each(|image| say(engine, (features, image), all));
     }
 
     /// Predicts and differentiates at most [`TOGETHER`] grids.
@@ -163,20 +151,11 @@ impl Lane {
         let Some((saved, gradients)) = &mut self.backward else {
             return;
         };
-        for image in 0..images {
-            let grid = input.part(image..image + 1);
-            let filled = image3_mut(out.prediction, image);
-            enter(engine, &mut self.fill, grid, filled);
-            lay_out((filled, grid), image, &mut room.input);
-        }
+        let shown = (&mut *out.prediction, &mut room.input);
+        show(engine, &mut self.fill, input, shown);
         let features = room.run(target, images, network, Some(saved));
         for image in 0..images {
-            target.run(Last {
-                engine,
-                features,
-                image,
-                out: image3_mut(out.prediction, image),
-            });
+            say(engine, (features, image), out.prediction);
             let by_prediction = image3_mut(&mut self.cotangents, image);
             cotangent(first + image, image3(out.prediction, image), by_prediction);
             target.run(LastAdjoint {
@@ -232,12 +211,32 @@ pub fn image3(planes: &[f32], image: usize) -> &[f32] {
     &planes[image * 3 * CELLS..][..3 * CELLS]
 }
 
-pub fn image3_mut(planes: &mut [f32], image: usize) -> &mut [f32] {
+fn image3_mut(planes: &mut [f32], image: usize) -> &mut [f32] {
     &mut planes[image * 3 * CELLS..][..3 * CELLS]
 }
 
+/// Lays out what the network sees of some grids; in `filled`, as planes, what its answer is added to.
+pub fn show(engine: &Engine, fill: &mut Room, input: Input, (filled, map): (&mut [f32], &mut Map)) {
+    for image in 0..input.images() {
+        let grid = input.part(image..image + 1);
+        let filled = image3_mut(filled, image);
+        enter(engine, fill, grid, filled);
+        lay_out((filled, grid), image, map);
+    }
+}
+
+/// The last layer's answer for one of the grids, added to what [`show`] left in `all`, or put in its place.
+pub fn say(engine: &Engine, (features, image): (&Map, usize), all: &mut [f32]) {
+    engine.target.run(Last {
+        engine,
+        features,
+        image,
+        out: image3_mut(all, image),
+    });
+}
+
 /// One grid's positions as the network sees them, but for their scale.
-pub fn enter(engine: &Engine, Room { pyramid, off }: &mut Room, grid: Input, filled: &mut [f32]) {
+fn enter(engine: &Engine, Room { pyramid, off }: &mut Room, grid: Input, filled: &mut [f32]) {
     match engine.config.input {
         InputKind::Membrane | InputKind::Plate => {
             let x = (off_base(grid, off), grid.known);
@@ -265,7 +264,7 @@ fn off_base<'a>(grid: Input<'a>, off: &'a mut Vec<f32>) -> &'a [f32] {
 }
 
 /// Three planes, scaled, the mask, and where up is as the channels of one panel.
-pub fn lay_out((filled, grid): (&[f32], Input), image: usize, input: &mut Map) {
+fn lay_out((filled, grid): (&[f32], Input), image: usize, input: &mut Map) {
     let up = grid.up.and_then(<[f32]>::first_chunk).unwrap_or(&[0.0; 3]);
     for row in 0..SIDE {
         for (column, to) in input.row_mut([image, 0], row).iter_mut().enumerate() {
@@ -293,11 +292,11 @@ fn take_out(input: &Map, image: usize, (by_filled, by_known): (&mut [f32], &mut 
 }
 
 /// The last layer: features to positions, added to the membrane in `out` or put in its place.
-pub struct Last<'a> {
-    pub engine: &'a Engine,
-    pub features: &'a Map,
-    pub image: usize,
-    pub out: &'a mut [f32],
+struct Last<'a> {
+    engine: &'a Engine,
+    features: &'a Map,
+    image: usize,
+    out: &'a mut [f32],
 }
 
 impl Kernel for Last<'_> {

@@ -7,11 +7,11 @@ use crate::net::InputKind;
 const CELL: f64 = 1.0 / 64.0;
 
 /// A small generator of its own, so that the tests' numbers stay.
-struct Random(u64);
+pub(super) struct Random(pub u64);
 
 impl Random {
     /// In −1..1.
-    fn next(&mut self) -> f32 {
+    pub fn next(&mut self) -> f32 {
         self.0 = self
             .0
             .wrapping_mul(6364136223846793005)
@@ -19,12 +19,12 @@ impl Random {
         (self.0 >> 40) as f32 / (1u64 << 23) as f32 - 1.0
     }
 
-    fn values(&mut self, count: usize, size: f32) -> Vec<f32> {
+    pub fn values(&mut self, count: usize, size: f32) -> Vec<f32> {
         (0..count).map(|_| self.next() * size).collect()
     }
 }
 
-fn config(width: usize, input: InputKind) -> UnetConfig {
+pub(super) fn config(width: usize, input: InputKind) -> UnetConfig {
     UnetConfig {
         width,
         input,
@@ -33,7 +33,7 @@ fn config(width: usize, input: InputKind) -> UnetConfig {
 }
 
 /// Random weights that keep activations O(1), with statistics away from zero and one.
-fn tensors(width: usize) -> NamedTensors {
+pub(super) fn tensors(width: usize) -> NamedTensors {
     let mut random = Random(7);
     let mut tensors = NamedTensors::new();
     let mut put = |name: String, shape: Vec<usize>, middle: f32, size: f32| {
@@ -107,7 +107,7 @@ fn tensors(width: usize) -> NamedTensors {
 }
 
 /// Waves with noise and a soft-edged hole at a different place in each grid.
-fn grids(count: usize) -> (Vec<f32>, Vec<f32>) {
+pub(super) fn grids(count: usize) -> (Vec<f32>, Vec<f32>) {
     let mut random = Random(3);
     let (mut positions, mut known) = (Vec::new(), Vec::new());
     for grid in 0..count {
@@ -136,7 +136,7 @@ fn grids(count: usize) -> (Vec<f32>, Vec<f32>) {
     (positions, known)
 }
 
-fn input<'a>(positions: &'a [f32], known: &'a [f32]) -> Input<'a> {
+pub(super) fn input<'a>(positions: &'a [f32], known: &'a [f32]) -> Input<'a> {
     Input {
         positions,
         known,
@@ -145,18 +145,23 @@ fn input<'a>(positions: &'a [f32], known: &'a [f32]) -> Input<'a> {
     }
 }
 
-fn wide(x: &[f32]) -> Vec<f64> {
+pub(super) fn wide(x: &[f32]) -> Vec<f64> {
     x.iter().map(|x| f64::from(*x)).collect()
 }
 
-fn targets() -> Vec<Isa> {
+pub(super) fn targets() -> Vec<Isa> {
     Isa::ALL
         .into_iter()
         .filter(|isa| isa.is_available())
         .collect()
 }
 
-fn engine(tensors: &NamedTensors, config: UnetConfig, isa: Isa, threads: usize) -> Engine {
+pub(super) fn engine(
+    tensors: &NamedTensors,
+    config: UnetConfig,
+    isa: Isa,
+    threads: usize,
+) -> Engine {
     let isa = Some(isa);
     Engine::new(tensors, &config, Options { isa, threads }).unwrap()
 }
@@ -401,102 +406,4 @@ fn what_is_wrong_has_a_name() {
 fn an_engine_is_shared_between_threads() {
     fn shared<T: Send + Sync>() {}
     shared::<Engine>();
-}
-
-#[test]
-fn the_gradient_by_the_weights_is_the_difference_quotient() {
-    for width in [3] {
-        let (tensors, config) = (tensors(width), config(width, InputKind::Membrane));
-        let (positions, known) = grids(1);
-        let mut random = Random(11);
-        let cotangent = random.values(positions.len(), 1.0);
-        let loss = |tensors: &NamedTensors| -> f64 {
-            let prediction =
-                Reference { tensors, config }.predict(&wide(&positions), &wide(&known));
-            let both = prediction.iter().zip(&cotangent);
-            both.map(|(p, c)| p * f64::from(*c)).sum()
-        };
-        // One weight of each kind of tensor, at the finest level, the coarsest and between.
-        let names = [
-            "down.0.conv0.weight",
-            "down.0.norm1.scale",
-            "down.2.conv1.weight",
-            "down.4.conv0.weight",
-            "down.4.norm0.shift",
-            "up.2.conv.weight",
-            "up.1.gate.skip.weight",
-            "up.1.gate.signal_norm.scale",
-            "up.0.gate.score.weight",
-            "up.0.gate.score.bias",
-            "up.0.block.conv0.weight",
-            "up.2.block.conv1.weight",
-            "last.weight",
-            "last.bias",
-        ];
-        // Below the distance to the next kink of a ReLU, for most weights; exact in f32.
-        let step = 1.0 / 65536.0;
-        let places: Vec<(&str, usize, f64)> = names
-            .into_iter()
-            .map(|name| {
-                let place = (random.next().abs() * tensors[name].1.len() as f32) as usize;
-                let moved = |by: f32| {
-                    let mut tensors = tensors.clone();
-                    let value = tensors.get_mut(name).map(|(_, values)| &mut values[place]);
-                    let value = value.unwrap();
-                    let before = *value;
-                    *value += by;
-                    let by = f64::from(*value) - f64::from(before);
-                    (loss(&tensors), by)
-                };
-                let (above, below) = (moved(step), moved(-step));
-                (name, place, (above.0 - below.0) / (above.1 - below.1))
-            })
-            .collect();
-        for isa in targets() {
-            let engine = engine(&tensors, config, isa, 1);
-            let mut lessons = Lessons::default();
-            let given = |_: Range<usize>, _: &[f32], to: &mut [f32]| to.copy_from_slice(&cotangent);
-            let input = input(&positions, &known);
-            let slopes = engine.learn(&mut lessons, &tensors, input, &given).unwrap();
-            let statistics = |name: &str| name.ends_with(".mean") || name.ends_with(".variance");
-            let trained = tensors.keys().filter(|name| !statistics(name));
-            assert!(trained.eq(slopes.keys()));
-            for (name, place, quotient) in &places {
-                let slope = f64::from(slopes[*name].1[*place]);
-                eprintln!(
-                    "{width} {} {name}[{place}]: {slope:.6} {quotient:.6}",
-                    isa.name()
-                );
-                assert!((slope - quotient).abs() < 0.02 * quotient.abs().max(0.2));
-            }
-        }
-    }
-}
-
-#[test]
-fn lessons_of_many_grids_are_the_sum_of_lessons_of_one() {
-    let (tensors, config) = (tensors(4), config(4, InputKind::Zeros));
-    let (positions, known) = grids(6);
-    let cotangent = Random(5).values(positions.len(), 1.0);
-    let engine = engine(&tensors, config, Target::best().isa(), 1);
-    let mut lessons = Lessons::default();
-    let mut learn = |grids: Range<usize>| {
-        let part = input(&positions, &known).part(grids.clone());
-        let cotangent = &cotangent[grids.start * 3 * CELLS..grids.end * 3 * CELLS];
-        let given = |grids: Range<usize>, _: &[f32], to: &mut [f32]| {
-            to.copy_from_slice(&cotangent[grids.start * 3 * CELLS..grids.end * 3 * CELLS]);
-        };
-        engine.learn(&mut lessons, &tensors, part, &given).unwrap()
-    };
-    let all = learn(0..6);
-    let each: Vec<NamedTensors> = (0..6).map(|grid| learn(grid..grid + 1)).collect();
-    for (name, (_, values)) in &all {
-        for (place, x) in values.iter().enumerate() {
-            let sum: f32 = each.iter().map(|one| one[name].1[place]).sum();
-            assert!(
-                (x - sum).abs() < 1e-3 * sum.abs().max(1.0),
-                "{name}: {x} {sum}"
-            );
-        }
-    }
 }
