@@ -302,7 +302,8 @@ fn spacing(region: &Region, chart: &Chart) -> f64 {
         median_edge(region, chart),
         chart.frame.side / grid::SIDE as f64,
     );
-    cell.clamp(FINER * edge, edge)
+    // Not `clamp`, which panics where a chart is not finite.
+    cell.max(FINER * edge).min(edge)
 }
 
 /// How much finer than the scan a patch may be.
