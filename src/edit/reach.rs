@@ -6,7 +6,7 @@ use crate::mesh::{Vec2, Vec3};
 
 /// Share by which cloth gives way before it counts as out of reach: more than woven cloth likes, so that a hand on it is felt, and less than
 /// what a patch allows an edge.
-const GIVE: f64 = 0.15;
+const GIVE: f64 = 0.22;
 /// Most rim vertices that are looked at; their neighbours' bounds follow from theirs but for a share of an edge.
 const MOST_OF_RIM: usize = 128;
 /// Up to as many points every pair is kept within its length; beyond, each point and those placed just before it.

@@ -1,14 +1,15 @@
 //! A patch in two halves: what the hole alone decides (triangles, factors), and what each fill of it needs.
 
-use super::cloth::{Elastics, Fabric};
+use super::cloth::Fabric;
 use super::contacts::Surroundings;
 use super::harmonic::Extension;
 use super::hem::Hem;
-use super::pull::{Grip, Pull, Pulls};
+use super::pull::Pull;
 use super::triangulate::{self, Triangulation};
-use super::{Options, Patch, PatchError, locate, untangle};
+use super::{Options, Patch, PatchError, untangle};
+
+mod touch;
 use crate::flatten::Chart;
-use crate::flatten::cholesky::NotPositive;
 use crate::grid;
 use crate::mesh::region::Region;
 use crate::mesh::{Vec2, Vec3};
@@ -90,6 +91,11 @@ impl Plan {
         &self.rim
     }
 
+    /// The harmonic extension from the rim.
+    pub(super) fn seam(&self) -> &Extension {
+        &self.seam
+    }
+
     /// Bytes held, about: for a cap on what sessions keep.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.rim[..])
@@ -136,7 +142,7 @@ impl Plan {
             collisions: 0,
         };
         patch.collisions = self.surroundings.separate(&mut patch);
-        let grips = self.grips(pulls);
+        let grips = self.grips(pulls, chart);
         if !grips.is_empty() {
             let inner = patch.positions[self.own.len()..].to_vec();
             let mut positions = self.hem.with_inner(inner);
@@ -170,110 +176,7 @@ impl Plan {
         let closed = drawn.iter().zip(&spread).map(|(p, d)| p + Vec3::from(*d));
         Ok(closed.skip(self.own.len()).collect())
     }
-
-    /// Draws the cloth, at rest where it lies, to where the pulls want it, as far as its strain allows; the rounds.
-    fn pull(
-        &self,
-        fabric: &Fabric,
-        positions: &mut [Vec3],
-        grips: &[Grip],
-        elastics: &Elastics,
-    ) -> Result<usize, NotPositive> {
-        let unpulled = positions.to_vec();
-        let bound = STRETCH.max(MORE * self.stretch(&unpulled));
-        let drawn = fabric.at_rest(positions);
-        let mut ready = Pulls::new(fabric, positions, grips)?;
-        self.lift(positions, grips)?;
-        let mut rounds = 0;
-        for _ in 0..=EASINGS {
-            rounds += fabric.settle(&drawn, positions, elastics, &ready)?.rounds;
-            if self.stretch(positions) <= bound {
-                return Ok(rounds);
-            }
-            ready.ease();
-        }
-        positions.copy_from_slice(&unpulled);
-        Ok(rounds)
-    }
-
-    /// Where the pulls take hold.
-    fn grips(&self, pulls: &[Pull]) -> Vec<Grip> {
-        let grip = |pull: &Pull| {
-            let (face, weights) = locate(&self.tiled.points, &self.tiled.faces, pull.at)?;
-            let face = self.tiled.faces[face];
-            let corners = face.map(|v| self.hem.place(v) as usize);
-            let shift = self.shift.as_ref().map_or(Vec3::zeros(), |shift| {
-                let each = face.iter().zip(&weights);
-                each.map(|(v, w)| shift[*v as usize] * *w).sum()
-            });
-            Some(Grip {
-                corners: std::array::from_fn(|k| (corners[k], weights[k])),
-                to: pull.to - shift,
-                hold: pull.hold,
-            })
-        };
-        pulls.iter().filter_map(grip).collect()
-    }
-
-    /// Moves the cloth so that the pulls are met, by the smoothest displacement that is zero at the rim (biharmonic): strain limiting
-    /// starts from a fold, not from a spike.
-    fn lift(&self, positions: &mut [Vec3], grips: &[Grip]) -> Result<(), NotPositive> {
-        let free = self.tiled.points.len() - self.rim.len();
-        let mut bumps = Vec::with_capacity(grips.len());
-        for grip in grips {
-            let mut bump = vec![[0.0]; free];
-            for (v, w) in grip.corners.iter().filter(|(v, _)| *v < free) {
-                bump[*v][0] += w;
-            }
-            self.seam.solve(&mut bump)?;
-            self.seam.solve(&mut bump)?;
-            bumps.push(bump);
-        }
-        let count = grips.len();
-        let at = |grip: &Grip, bump: &[[f64; 1]]| -> f64 {
-            let own = grip.corners.iter().filter(|(v, _)| *v < free);
-            own.map(|(v, w)| bump[*v][0] * w).sum()
-        };
-        let mut gram = nalgebra::DMatrix::from_fn(count, count, |i, j| at(&grips[i], &bumps[j]));
-        // Pulls on one triangle that disagree are met on average.
-        let slack = 1e-6 * gram.trace() / count as f64 + f64::MIN_POSITIVE;
-        (0..count).for_each(|k| gram[(k, k)] += slack);
-        let mut gaps = nalgebra::DMatrix::zeros(count, 3);
-        for (k, grip) in grips.iter().enumerate() {
-            gaps.set_row(k, &(grip.to - grip.place(positions)).transpose());
-        }
-        gram.cholesky().ok_or(NotPositive)?.solve_mut(&mut gaps);
-        for (k, bump) in bumps.iter().enumerate() {
-            let gap = Vec3::new(gaps[(k, 0)], gaps[(k, 1)], gaps[(k, 2)]);
-            (positions.iter_mut().zip(bump)).for_each(|(p, b)| *p += gap * b[0]);
-        }
-        Ok(())
-    }
-
-    /// Largest ratio of an edge with a free end to its length in the chart.
-    fn stretch(&self, positions: &[Vec3]) -> f64 {
-        let free = self.tiled.points.len() - self.rim.len();
-        let sheet = self.hem.sheet();
-        let edges = (sheet.faces.iter())
-            .flat_map(|f| [(f[0], f[1]), (f[1], f[2]), (f[2], f[0])])
-            .map(|(a, b)| (a as usize, b as usize))
-            .filter(|(a, b)| *a.min(b) < free);
-        let ratio = |(a, b): (usize, usize)| {
-            (positions[a] - positions[b]).norm_squared()
-                / (sheet.rest[a] - sheet.rest[b])
-                    .norm_squared()
-                    .max(f64::MIN_POSITIVE)
-        };
-        edges.map(ratio).fold(0.0, f64::max).sqrt()
-    }
 }
-
-/// Pulls may stretch an edge this much, ...
-const STRETCH: f64 = 1.25;
-/// ... or this much more than it is stretched without them.
-const MORE: f64 = 1.05;
-/// How often the forces of pulls are halved before they are given up.
-const EASINGS: usize = 8;
 
 fn singular(stage: &'static str) -> PatchError {
     PatchError::Singular { stage }

@@ -1,10 +1,11 @@
 //! A user's anchors: points of the patch that are drawn to places in space, as forces on the cloth's energy.
 //!
-//! A pull acts on the corners of the triangle that holds its point, by their barycentric weights. Its force is bounded by what cloth
-//! bears, so that no target, however far, tears it. Pulls change the energy's matrix by one row each; the factor stays and the rows
-//! enter by the Woodbury identity: with Z = A⁻¹Bᵀ and G = BZ, the forces λ of targets t solve (G + W⁻¹) λ = t − B A⁻¹r.
+//! A pull is met by the point it names, by barycentric weights, and acts like a finger on all vertices near it: a force on one triangle
+//! alone would draw a thread out of the cloth. Its force is bounded by what cloth bears, so that no target, however far, tears it. Pulls
+//! change the energy's matrix by one row each; the factor stays and the rows enter by the Woodbury identity: with B the points' rows,
+//! C the forces' and Z = A⁻¹Cᵀ, the forces λ of targets t solve (B Z + W⁻¹) λ = t − B A⁻¹r.
 
-use nalgebra::{Cholesky, DMatrix, Dyn};
+use nalgebra::{DMatrix, Dyn, LU};
 
 use crate::flatten::cholesky::NotPositive;
 use crate::mesh::{Vec2, Vec3};
@@ -40,11 +41,11 @@ impl Hold {
         }
     }
 
-    /// Largest force, in mean edges: strain 1 of a strip as wide as this.
+    /// Largest force, in fingers: strain 1 of a strip as wide as this.
     fn strength(self) -> f64 {
         match self {
-            Hold::Soft => 2.0,
-            Hold::Hard => 8.0,
+            Hold::Soft => 1.0,
+            Hold::Hard => 4.0,
         }
     }
 }
@@ -52,14 +53,23 @@ impl Hold {
 /// A pull in terms of the free vertices: Σ weight · position = goal.
 struct Row {
     terms: Vec<(usize, f64)>,
-    goal: Vec3,
+    /// How its force is shared out; the shares add up to one.
+    force: Vec<(usize, f64)>,
+    /// The free vertices' part of where the point lies unpulled, and where it is to go.
+    way: [Vec3; 2],
     hold: Hold,
+    /// Largest force.
+    strength: f64,
 }
 
 /// Where a pull takes hold: patch vertices with their weights.
 pub(super) struct Grip {
     /// Corners in the order of the fabric's vertices, with their barycentric weights.
     pub corners: [(usize, f64); 3],
+    /// Free vertices that its force acts on, with their shares.
+    pub finger: Vec<(usize, f64)>,
+    /// Radius of the finger, scene units.
+    pub radius: f64,
     /// The place it is drawn to.
     pub to: Vec3,
     /// How firmly.
@@ -76,11 +86,11 @@ impl Grip {
 /// Pulls made ready for a fabric.
 pub(super) struct Pulls {
     rows: Vec<Row>,
-    /// A⁻¹Bᵀ, one column of free vertices per pull.
+    /// A⁻¹Cᵀ, one column of free vertices per pull.
     response: Vec<Vec<f64>>,
-    gram: Option<Cholesky<f64, Dyn>>,
-    /// Largest force per pull.
-    strength: Vec<f64>,
+    gram: Option<LU<f64, Dyn, Dyn>>,
+    /// Share of their ways that the points are to go.
+    share: f64,
 }
 
 impl Pulls {
@@ -90,11 +100,11 @@ impl Pulls {
             rows: Vec::new(),
             response: Vec::new(),
             gram: None,
-            strength: Vec::new(),
+            share: 1.0,
         }
     }
 
-    /// Pulls on a fabric whose held vertices lie at `positions`; those that hold on to no free vertex are left out.
+    /// Pulls on a fabric that lies at `positions`; those that hold on to no free vertex are left out.
     ///
     /// # Errors
     /// `NotPositive` when the fabric's matrix cannot be solved.
@@ -103,10 +113,13 @@ impl Pulls {
             .iter()
             .filter_map(|g| Row::of(g, fabric.free(), positions))
             .collect();
+        if rows.is_empty() {
+            return Ok(Pulls::none());
+        }
         let mut response = Vec::with_capacity(rows.len());
         for row in &rows {
             let mut column = vec![[0.0]; fabric.free()];
-            row.terms.iter().for_each(|(v, w)| column[*v][0] += w);
+            row.force.iter().for_each(|(v, w)| column[*v][0] += w);
             fabric.solve(&mut column)?;
             response.push(column.into_iter().flatten().collect::<Vec<f64>>());
         }
@@ -121,21 +134,22 @@ impl Pulls {
         for (k, row) in rows.iter().enumerate() {
             gram[(k, k)] += row.hold.compliance() + slack;
         }
-        let strength = rows
-            .iter()
-            .map(|row| row.hold.strength() * fabric.edge)
-            .collect();
         Ok(Pulls {
-            gram: Some(gram.cholesky().ok_or(NotPositive)?),
+            gram: Some(gram.lu()),
             rows,
             response,
-            strength,
+            share: 1.0,
         })
     }
 
-    /// Halves the largest forces.
-    pub fn ease(&mut self) {
-        self.strength.iter_mut().for_each(|s| *s *= 0.5);
+    /// Whether there is nothing to pull at.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Takes the points only this share as far as before.
+    pub fn ease(&mut self, share: f64) {
+        self.share *= share;
     }
 
     /// Adds to a solution without pulls what their forces, as far as they are borne, do to it.
@@ -150,12 +164,15 @@ impl Pulls {
                 .iter()
                 .map(|(v, w)| Vec3::from(solution[*v]) * *w)
                 .sum();
-            forces.set_row(k, &(row.goal - place).transpose());
+            let goal = row.way[0].lerp(&row.way[1], self.share);
+            forces.set_row(k, &(goal - place).transpose());
         }
-        gram.solve_mut(&mut forces);
+        if !gram.solve_mut(&mut forces) {
+            return;
+        }
         for (k, column) in self.response.iter().enumerate() {
             let force = Vec3::new(forces[(k, 0)], forces[(k, 1)], forces[(k, 2)])
-                .cap_magnitude(self.strength[k]);
+                .cap_magnitude(self.rows[k].strength);
             for (x, z) in solution.iter_mut().zip(column) {
                 (0..3).for_each(|d| x[d] += force[d] * z);
             }
@@ -167,13 +184,17 @@ impl Row {
     fn of(grip: &Grip, free: usize, positions: &[Vec3]) -> Option<Row> {
         let (terms, held): (Vec<_>, Vec<_>) =
             grip.corners.iter().copied().partition(|(v, _)| *v < free);
-        let held: Vec3 = held.iter().map(|(v, w)| positions[*v] * *w).sum();
+        let place =
+            |of: &[(usize, f64)]| -> Vec3 { of.iter().map(|(v, w)| positions[*v] * *w).sum() };
+        let way = [place(&terms), grip.to - place(&held)];
         // A point next to the rim can only be moved by throwing the nearest free vertex far: it stays with the rim.
         let share: f64 = terms.iter().map(|(_, w)| w).sum();
         (share > LEAST_SHARE).then_some(Row {
             terms,
-            goal: grip.to - held,
+            force: grip.finger.clone(),
+            way,
             hold: grip.hold,
+            strength: grip.hold.strength() * grip.radius,
         })
     }
 }

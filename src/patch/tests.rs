@@ -124,3 +124,42 @@ fn a_pull_beside_the_hole_does_nothing() {
         free
     );
 }
+
+#[test]
+fn a_pull_at_the_rim_does_nothing() {
+    let (region, chart, filled) = wavy(1.0);
+    let (plan, free, _) = unpulled(&region, &chart, &filled);
+    let pull = Pull {
+        at: plan.flat()[0],
+        to: Vec3::zeros(),
+        hold: Hold::Soft,
+    };
+    assert_eq!(
+        plan.patch(&chart, &filled, &[pull], &Options::default())
+            .unwrap(),
+        free
+    );
+}
+
+/// A finger moves the cloth about it, not one triangle: beside a pulled point its neighbours have come most of the way.
+#[test]
+fn a_pull_draws_no_pimple() {
+    let (region, chart, filled) = wavy(1.05);
+    let (plan, free, middle) = unpulled(&region, &chart, &filled);
+    let to = free.positions[middle] + Vec3::new(0.0, 0.0, 0.02);
+    let pull = Pull {
+        at: free.flat[middle],
+        to,
+        hold: Hold::Soft,
+    };
+    let patch = plan
+        .patch(&chart, &filled, &[pull], &Options::default())
+        .unwrap();
+    let moved = |v: usize| (patch.positions[v] - free.positions[v]).norm();
+    let near = (0..free.flat.len())
+        .filter(|v| (free.flat[*v] - free.flat[middle]).norm() < 1.5 * chart.frame.side / 64.0);
+    assert!(near.clone().count() > 4);
+    for v in near {
+        assert!(moved(v) > 0.6 * moved(middle), "{}", moved(v));
+    }
+}
