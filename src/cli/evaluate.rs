@@ -7,6 +7,7 @@ use super::network::NetworkArgs;
 use super::progress::Progress;
 use darn::evaluate::{self, Cut, EvaluateError, Plan, Report, ScanRow, Shares};
 use darn::grid::NormalGrid;
+use darn::net::Averaging;
 use darn::patch::Options;
 use darn::scarffolds::samples::{Sampler, Turning};
 use darn::scarffolds::sheets::{self, Sheet};
@@ -44,7 +45,7 @@ pub struct Args {
     /// Compare the holes of training samples with those of flattened scans instead
     #[arg(long, conflicts_with_all = ["noise", "picture", "upright", "scans"])]
     masks: bool,
-    /// Ask the network once a grid, not for all of its eight symmetries
+    /// Ask the network once a grid, not for its four flips
     #[arg(long)]
     once: bool,
     #[command(flatten)]
@@ -71,7 +72,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let fill = |grids: &[NormalGrid]| {
         let filled = match args.once {
             true => network.fill(grids),
-            false => network.fill_averaged(grids),
+            false => network.fill_averaged(grids, Averaging::Flips),
         };
         filled.map_err(|error| EvaluateError::Filler(Box::new(error)))
     };

@@ -5,6 +5,7 @@ use super::inpainter::Inpainter;
 use super::prepared::{Prepared, Unedited};
 use crate::grid::NormalGrid;
 use crate::mesh::Vec3;
+use crate::net::Averaging;
 
 /// How the network is asked for edited cloth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -42,11 +43,11 @@ pub fn moved(
     };
     let imagined = match response {
         Response::Plain => {
-            let answers = inpainter.fill(&[given(1.0)])?;
+            let answers = inpainter.fill(&[given(1.0)], Averaging::Flips)?;
             prepared.in_scene(answers.first().map_or(&[], Vec::as_slice))
         }
         Response::Difference => {
-            let answers = inpainter.fill(&[given(1.0), given(0.0)])?;
+            let answers = inpainter.fill(&[given(1.0), given(0.0)], Averaging::HalfTurn)?;
             let mut answers = answers.iter().map(|a| prepared.in_scene(a));
             let (moved, held) = (answers.next(), answers.next());
             let each = unedited.predicted.iter();

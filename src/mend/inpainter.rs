@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use crate::contract::{FieldError, v1};
 use crate::grid::NormalGrid;
 use crate::mesh::Vec3;
-use crate::net::{AnchorLoss, NetError, Network, Networks, WeightsCard};
+use crate::net::{AnchorLoss, Averaging, NetError, Network, Networks, WeightsCard};
 
 /// The network for a request that gives an up direction and names no weights.
 const FOR_UP: &str = "gravity";
@@ -88,13 +88,17 @@ impl<'a> Inpainter<'a> {
     }
 
     /// Predicts every cell of every grid, in the network's units.
-    pub fn fill(&self, grids: &[NormalGrid]) -> Result<Vec<Vec<[f32; 3]>>, NetError> {
+    pub fn fill(
+        &self,
+        grids: &[NormalGrid],
+        averaging: Averaging,
+    ) -> Result<Vec<Vec<[f32; 3]>>, NetError> {
         let Some(turn) = &self.turn else {
-            return self.network.fill_averaged(grids);
+            return self.network.fill_averaged(grids, averaging);
         };
         let turned: Vec<NormalGrid> = grids.iter().map(|g| self.turned(g)).collect();
         let back = turn.transpose();
-        let mut answers = self.network.fill_averaged(&turned)?;
+        let mut answers = self.network.fill_averaged(&turned, averaging)?;
         for p in answers.iter_mut().flatten() {
             *p = times(&back, *p);
         }

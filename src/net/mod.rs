@@ -34,6 +34,7 @@ pub use convolve::Convolve;
 pub use fill::{InputKind, membrane, over, plate};
 pub use frame::{Frame, FrameKind};
 pub use networks::Networks;
+pub use symmetry::Averaging;
 pub use unet::{Sight, Unet, UnetConfig};
 pub use weights::{TrainingCard, WeightsCard};
 
