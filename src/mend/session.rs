@@ -60,11 +60,13 @@ impl Session {
         }
     }
 
-    /// Bytes of memory it holds, about.
+    /// Bytes of memory it holds, about, and rather more than less: half as much again as is counted. Allocators round up, and factors fill
+    /// in more than is foreseen: a thousand abandoned sessions of 4.2 MiB took 6.0 each.
     pub fn bytes(&self) -> usize {
         let holes: usize = self.opened.holes.iter().map(Prepared::bytes).sum();
         let described: usize = self.described.holes.iter().map(hole_bytes).sum();
-        self.scan.bytes_held() + self.opened.cloth.bytes() + holes + described
+        let counted = self.scan.bytes_held() + self.opened.cloth.bytes() + holes + described;
+        counted + counted / 2
     }
 
     /// The whole scan mended: the bytes that [`mend`](super::mend) gives for the same constraints.
