@@ -23,8 +23,28 @@ pub enum Smooth {
     TautPlate,
 }
 
-/// A difference of cells: Σ coefficient · position.
-type Difference = Vec<(usize, f64)>;
+/// A weighted difference of cells: Σ coefficient · position.
+struct Difference {
+    weight: f64,
+    /// The first `count` count.
+    terms: [(usize, f64); 4],
+    count: usize,
+}
+
+impl Difference {
+    fn new<const N: usize>(weight: f64, terms: [(usize, f64); N]) -> Difference {
+        let term = |k: usize| terms.get(k).copied().unwrap_or_default();
+        Difference {
+            weight,
+            terms: [term(0), term(1), term(2), term(3)],
+            count: N,
+        }
+    }
+
+    fn terms(&self) -> &[(usize, f64)] {
+        &self.terms[..self.count]
+    }
+}
 
 /// Positions with the hole filled to the least energy; cells neither known nor in the hole keep what they hold.
 ///
@@ -44,20 +64,41 @@ pub fn smooth(
     let mut system = Symmetric::zero(open.len());
     let mut rhs = vec![[0.0; 3]; open.len()];
     let present = |k: usize| hole[k] || known[k];
-    for (weight, row) in differences(energy) {
-        let counts = row.iter().all(|&(k, _)| present(k)) && row.iter().any(|&(k, _)| hole[k]);
+    let mut free = Vec::with_capacity(4);
+    let mut add = |difference: Difference| {
+        let terms = difference.terms();
+        let counts = terms.iter().all(|&(k, _)| present(k)) && terms.iter().any(|&(k, _)| hole[k]);
         if !counts {
-            continue;
+            return;
         }
-        let (free, given): (Difference, Difference) = row.iter().partition(|&&(k, _)| hole[k]);
-        let free: Difference = free.iter().map(|&(k, c)| (unknown[k], c)).collect();
-        let constant: Vec3 = given.iter().map(|&(k, c)| positions[k] * c).sum();
-        system.add_square(&free, weight);
-        for &(place, c) in &free {
-            for axis in 0..3 {
-                rhs[place][axis] -= weight * c * constant[axis];
+        free.clear();
+        let mut constant = Vec3::zeros();
+        for &(k, c) in terms {
+            if hole[k] {
+                free.push((unknown[k], c));
+            } else {
+                constant += positions[k] * c;
             }
         }
+        system.add_square(&free, difference.weight);
+        for &(place, c) in &free {
+            for axis in 0..3 {
+                rhs[place][axis] -= difference.weight * c * constant[axis];
+            }
+        }
+    };
+    if energy != Smooth::Membrane {
+        (0..CELLS).flat_map(bendings).for_each(&mut add);
+    }
+    let tension = match energy {
+        Smooth::Membrane => 1.0,
+        Smooth::ThinPlate => 0.0,
+        Smooth::TautPlate => TENSION,
+    };
+    if tension > 0.0 {
+        neighbour_pairs()
+            .map(|(a, b)| Difference::new(tension, [(a, -1.0), (b, 1.0)]))
+            .for_each(add);
     }
     solved(&system, &mut rhs).ok()?;
     let mut filled = positions.to_vec();
@@ -74,32 +115,21 @@ fn solved(system: &Symmetric, rhs: &mut [[f64; 3]]) -> Result<(), NotPositive> {
     system.factor()?.solve(rhs)
 }
 
-/// All differences of an energy on the whole grid, with their weights.
-fn differences(energy: Smooth) -> Vec<(f64, Difference)> {
-    let stretches =
-        |weight: f64| neighbour_pairs().map(move |(a, b)| (weight, vec![(a, -1.0), (b, 1.0)]));
-    let bendings = || (0..CELLS).flat_map(bendings);
-    match energy {
-        Smooth::Membrane => stretches(1.0).collect(),
-        Smooth::ThinPlate => bendings().collect(),
-        Smooth::TautPlate => bendings().chain(stretches(TENSION)).collect(),
-    }
-}
-
 /// The second differences whose least cell is `k`: along u, along v, and mixed.
-fn bendings(k: usize) -> impl Iterator<Item = (f64, Difference)> {
+fn bendings(k: usize) -> impl Iterator<Item = Difference> {
     let (i, j) = (k % SIDE, k / SIDE);
-    let straight = |step: usize| (1.0, vec![(k, 1.0), (k + step, -2.0), (k + 2 * step, 1.0)]);
+    let straight =
+        |step: usize| Difference::new(1.0, [(k, 1.0), (k + step, -2.0), (k + 2 * step, 1.0)]);
     let along_u = (i + 2 < SIDE).then(|| straight(1));
     let along_v = (j + 2 < SIDE).then(|| straight(SIDE));
     let mixed = (i + 1 < SIDE && j + 1 < SIDE).then(|| {
-        let corners = vec![
+        let corners = [
             (k, 1.0),
             (k + 1, -1.0),
             (k + SIDE, -1.0),
             (k + SIDE + 1, 1.0),
         ];
-        (2.0, corners)
+        Difference::new(2.0, corners)
     });
     [along_u, along_v, mixed].into_iter().flatten()
 }

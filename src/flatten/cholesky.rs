@@ -4,7 +4,7 @@
 use faer::linalg::solvers::SolveCore;
 use faer::sparse::linalg::solvers::Llt;
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
-use faer::{Conj, Mat, Side};
+use faer::{Conj, MatMut, Side};
 
 /// The matrix was not positive definite (or not finite).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -117,11 +117,8 @@ impl Factor {
     /// # Errors
     /// `NotPositive` when the solution is not finite.
     pub fn solve<const K: usize>(&self, rhs: &mut [[f64; K]]) -> Result<(), NotPositive> {
-        let mut x = Mat::from_fn(self.size, K, |i, k| rhs[i][k]);
-        self.llt.solve_in_place_with_conj(Conj::No, x.as_mut());
-        for (i, row) in rhs.iter_mut().enumerate() {
-            *row = std::array::from_fn(|k| x[(i, k)]);
-        }
+        let x = MatMut::from_row_major_slice_mut(rhs.as_flattened_mut(), self.size, K);
+        self.llt.solve_in_place_with_conj(Conj::No, x);
         if rhs.iter().flatten().all(|x| x.is_finite()) {
             Ok(())
         } else {

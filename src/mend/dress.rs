@@ -43,30 +43,32 @@ pub fn addition(
         .map(|s| s.filter(|(p, _)| alike(*p)).map(|(_, c)| c))
         .collect();
     let mut any = vec![u32::MAX; region.mesh.positions.len()];
-    let mut part_of = BTreeMap::new();
+    let mut owners: Vec<(u32, usize)> = Vec::new();
     for (face, source) in region.mesh.faces.iter().zip(&sources) {
         let Some((p, scan_corners)) = source else {
             continue;
         };
+        if alike(*p) {
+            owners.extend(scan_corners.map(|s| (s, *p)));
+        }
         for (v, s) in face.iter().zip(scan_corners) {
             // A vertex of the patch's own node is preferred: its stored bits are copied.
             let own = scan.parts[*p].node == look.node;
             if own || any[*v as usize] == u32::MAX {
                 any[*v as usize] = *s;
             }
-            if alike(*p) {
-                part_of.insert(*s, *p);
-            }
         }
     }
+    // Parts may share vertices; the last to use one is asked.
+    owners.sort_by_key(|(s, _)| *s);
     let values = |s: u32| {
-        part_of
-            .get(&s)
-            .map_or_else(Vec::new, |p| columns_of(&scan.parts[*p], s))
+        let after = owners.partition_point(|(vertex, _)| *vertex <= s);
+        let owner = owners[..after].last().filter(|(vertex, _)| *vertex == s);
+        owner.map_or_else(Vec::new, |(_, p)| columns_of(&scan.parts[*p], s))
     };
     let width = 2 * look.texcoords.len() + 4 * look.colors.len();
     let dressed = dress(
-        patch,
+        (&prepared.plan, patch),
         region,
         chart,
         &Columns {

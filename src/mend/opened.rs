@@ -2,6 +2,8 @@
 
 use std::time::Instant;
 
+use rayon::prelude::*;
+
 use super::cloth::Cloth;
 use super::hole::{self, Made};
 use super::inpainter::Inpainter;
@@ -54,10 +56,11 @@ impl Opened {
         chosen_inpainter(asked, mender)?;
         let started = Instant::now();
         let prepare = |c: &Chosen| Prepared::new(&cloth, c.id, &mender.limits);
-        let holes: Result<Vec<Prepared>, MendError> =
-            selection.chosen.iter().map(prepare).collect();
+        // In two steps: of several errors the first hole's is told, whichever was found first.
+        let holes: Vec<Result<Prepared, MendError>> =
+            selection.chosen.par_iter().map(prepare).collect();
         Ok(Opened {
-            holes: holes?,
+            holes: holes.into_iter().collect::<Result<_, _>>()?,
             cloth,
             prepare_ms: milliseconds(started),
             asked: Constraints {
@@ -117,8 +120,7 @@ impl Opened {
         let Selection { chosen, skipped } = select(scan, &self.cloth, &constraints)?;
         let inpainter = chosen_inpainter(&constraints, mender)?;
         let started = Instant::now();
-        let mut holes = Vec::new();
-        for chosen in &chosen {
+        let make = |chosen: &Chosen| {
             let prepared = self.hole(chosen.id).ok_or_else(|| {
                 let opened: Vec<String> = self.holes.iter().map(|h| h.id.to_string()).collect();
                 let detail = format!(
@@ -129,10 +131,11 @@ impl Opened {
                 MendError::Constraints(vec![FieldError::new("/holes", detail)])
             })?;
             let made = hole::make((prepared, &self.cloth), chosen, &inpainter, &mender.limits)?;
-            holes.push((prepared, made));
-        }
+            Ok((prepared, made))
+        };
+        let holes: Vec<Result<_, MendError>> = chosen.par_iter().map(make).collect();
         Ok(Patched {
-            holes,
+            holes: holes.into_iter().collect::<Result<_, _>>()?,
             skipped,
             inpainter,
             fill_ms: milliseconds(started),

@@ -13,7 +13,7 @@ use crate::grid::{self, CELLS, Grid, NormalGrid, Normalisation};
 use crate::mesh::denoise::{Filter, denoised};
 use crate::mesh::region::{self, Region};
 use crate::mesh::{Vec2, Vec3};
-use crate::net;
+use crate::net::{self, Averaging};
 use crate::patch::{self, Patch, PatchError, Plan};
 
 /// How much of the grid's side the hole should take, so that hole and context share it as in training.
@@ -138,7 +138,8 @@ impl Prepared {
 
     fn fill(&self, inpainter: &Inpainter, limits: &Limits) -> Result<Unedited, MendError> {
         let started = Instant::now();
-        let answers = inpainter.fill(std::slice::from_ref(&self.normal_grid()))?;
+        let answers =
+            inpainter.fill(std::slice::from_ref(&self.normal_grid()), Averaging::Flips)?;
         let predicted = self.in_scene(answers.first().map_or(&[], Vec::as_slice));
         let net_ms = milliseconds(started);
         let started = Instant::now();
@@ -272,29 +273,37 @@ impl Laid {
 
     /// Samples the grid and plans the patch.
     fn sampled(self, id: u32, limits: &Limits) -> Result<Prepared, MendError> {
-        let started = Instant::now();
         let seen = self.smooth.as_ref().unwrap_or(&self.region);
-        let grid = flatten::raster(&seen.mesh, &self.chart);
-        let normal = grid.normalisation().ok_or(MendError::TooLittleKnown {
-            hole: id,
-            known: grid.known_count(),
-        })?;
         let polygon = self.rim_uv();
+        let sample = || {
+            let started = Instant::now();
+            let grid = flatten::raster(&seen.mesh, &self.chart);
+            let normal = grid.normalisation().ok_or(MendError::TooLittleKnown {
+                hole: id,
+                known: grid.known_count(),
+            })?;
+            let cells =
+                HoleCells::new(|k| !grid.known[k] && inside(&polygon, grid::cell_centre(k)));
+            let base = net::plate(&grid.normalised(&normal).positions, &grid.known);
+            Ok::<_, MendError>((grid, normal, cells, base, milliseconds(started)))
+        };
+        let plan = || {
+            let started = Instant::now();
+            let plan = patch::plan(seen, &self.chart, &limits.patch)
+                .and_then(|plan| match &self.smooth {
+                    Some(_) => plan.joining(&self.region.mesh.positions),
+                    None => Ok(plan),
+                })
+                .map_err(|source| MendError::Patch { hole: id, source })?;
+            Ok::<_, MendError>((plan, milliseconds(started)))
+        };
+        let (sampled, planned) = rayon::join(sample, plan);
+        let (grid, normal, cells, base, raster) = sampled?;
+        let (plan, patch) = planned?;
         let report = grid_report(&grid, &normal, &polygon);
-        let cells = HoleCells::new(|k| !grid.known[k] && inside(&polygon, grid::cell_centre(k)));
-        let base = net::plate(&grid.normalised(&normal).positions, &grid.known);
-        let raster = milliseconds(started);
-
-        let started = Instant::now();
-        let plan = patch::plan(seen, &self.chart, &limits.patch)
-            .and_then(|plan| match &self.smooth {
-                Some(_) => plan.joining(&self.region.mesh.positions),
-                None => Ok(plan),
-            })
-            .map_err(|source| MendError::Patch { hole: id, source })?;
         let timings = v1::HoleTimings {
             raster,
-            patch: milliseconds(started),
+            patch,
             ..self.timings
         };
         let denoised = self.smooth.is_some();

@@ -42,7 +42,7 @@ impl Anderson {
 
     /// Replaces x, the first vertices of `positions`, by the next point, given g(x); the largest |g(x) − x| of a vertex.
     pub fn advance(&mut self, positions: &mut [Vec3], step: &[[f64; 3]]) -> f64 {
-        let image: Vec<f64> = step.as_flattened()[..self.size].to_vec();
+        let image = &step.as_flattened()[..self.size];
         let mut residual = Vec::with_capacity(self.size);
         let mut farthest = 0.0f64;
         for (p, q) in positions.iter().zip(step) {
@@ -56,18 +56,22 @@ impl Anderson {
         }
         self.length = length;
         if let Some((old, old_image)) = self.last.take() {
-            self.remember(difference(&residual, old), difference(&image, old_image));
+            self.remember(difference(&residual, old), difference(image, old_image));
         }
-        let mut ahead = image.clone();
-        for (k, share) in self.shares(&residual).iter().enumerate().take(self.used) {
-            for (x, d) in ahead.iter_mut().zip(&self.steps[k]) {
-                *x -= share * d;
-            }
-        }
-        for (p, x) in positions.iter_mut().zip(ahead.as_chunks::<3>().0) {
+        for (p, x) in positions.iter_mut().zip(step) {
             *p = Vec3::from(*x);
         }
-        self.last = Some((residual, image));
+        for (share, d) in self
+            .shares(&residual)
+            .iter()
+            .zip(&self.steps)
+            .take(self.used)
+        {
+            for (p, d) in positions.iter_mut().zip(d.as_chunks::<3>().0) {
+                *p -= Vec3::from(*d) * *share;
+            }
+        }
+        self.last = Some((residual, image.to_vec()));
         farthest.sqrt()
     }
 

@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, Matrix3};
 
-use super::Patch;
 use super::harmonic::Extension;
+use super::{Patch, Plan};
 use crate::flatten::Chart;
 use crate::mesh::Vec2;
 use crate::mesh::region::Region;
@@ -46,10 +46,18 @@ pub struct Dressed {
 }
 
 /// Carries the columns over into the patch.
-pub fn dress(patch: &Patch, region: &Region, chart: &Chart, columns: &Columns) -> Dressed {
-    let islands = islands(columns);
+///
+/// `plan` is the one that the patch was made by.
+pub fn dress(
+    (plan, patch): (&Plan, &Patch),
+    region: &Region,
+    chart: &Chart,
+    columns: &Columns,
+) -> Dressed {
+    let islands = Islands::of(columns);
     let around = Around {
         columns,
+        seam: plan.seam(),
         rim: rim_edges(patch, region, columns, &islands),
         islands,
     };
@@ -61,7 +69,7 @@ pub fn dress(patch: &Patch, region: &Region, chart: &Chart, columns: &Columns) -
         .collect::<std::collections::BTreeSet<_>>()
         .into_iter()
         .collect();
-    let faces = face_labels(patch, rim, &labels);
+    let faces = face_labels(patch, &around, &labels);
     let sheets: BTreeMap<u32, Vec<Vec<f64>>> = labels
         .iter()
         .map(|l| (*l, continued(*l, patch, region, chart, &around)))
@@ -98,6 +106,8 @@ pub fn dress(patch: &Patch, region: &Region, chart: &Chart, columns: &Columns) -
 /// The attributes around a hole, sorted out.
 struct Around<'a> {
     columns: &'a Columns<'a>,
+    /// The extension from all of the rim.
+    seam: &'a Extension,
     /// The scan's side of every rim edge, in the patch's order.
     rim: Vec<Option<RimEdge>>,
     islands: Islands,
@@ -123,30 +133,46 @@ fn scan_vertex(rim: &[Option<RimEdge>], vertex: u32, island: u32) -> Option<u32>
         .or_else(|| of(rim[(k + rim.len() - 1) % rim.len()]).map(|e| e.to))
 }
 
-/// The island of every scan vertex that has attributes to carry.
-type Islands = BTreeMap<u32, u32>;
+/// The island of every scan vertex that has attributes to carry: region faces joined where they share scan vertices.
+struct Islands {
+    /// The vertices, ascending.
+    vertices: Vec<u32>,
+    /// Of each its island, named by its lowest vertex.
+    labels: Vec<u32>,
+}
 
-/// Islands of the texture: region faces joined where they share scan vertices; named by their lowest scan vertex.
-fn islands(columns: &Columns) -> Islands {
-    let mut parent: BTreeMap<u32, u32> = BTreeMap::new();
-    fn root(parent: &BTreeMap<u32, u32>, mut v: u32) -> u32 {
-        while parent[&v] != v {
-            v = parent[&v];
+impl Islands {
+    fn of(columns: &Columns) -> Islands {
+        let all = || columns.corners.iter().flatten();
+        let mut vertices: Vec<u32> = all().flatten().copied().collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        let place = |v: &u32| vertices.partition_point(|other| other < v);
+        let mut parent: Vec<usize> = (0..vertices.len()).collect();
+        let root = |parent: &[usize], mut k: usize| {
+            while parent[k] != k {
+                k = parent[k];
+            }
+            k
+        };
+        for corners in all() {
+            let places = corners.each_ref().map(place);
+            let roots = places.map(|k| root(&parent, k));
+            let lowest = roots[0].min(roots[1]).min(roots[2]);
+            // Pointing the corners themselves at the root as well keeps the paths short.
+            (roots.iter().chain(&places)).for_each(|k| parent[*k] = lowest);
         }
-        v
+        let labels = (0..vertices.len())
+            .map(|k| vertices[root(&parent, k)])
+            .collect();
+        Islands { vertices, labels }
     }
-    for corners in columns.corners.iter().flatten() {
-        for v in corners {
-            parent.entry(*v).or_insert(*v);
-        }
-        let roots = corners.map(|v| root(&parent, v));
-        let lowest = roots.into_iter().min().unwrap_or(roots[0]);
-        // Pointing the corners themselves at the root as well keeps the paths short.
-        roots.iter().chain(corners).for_each(|r| {
-            parent.insert(*r, lowest);
-        });
+
+    /// The island of a scan vertex of the region; none without attributes.
+    fn get(&self, vertex: u32) -> Option<u32> {
+        let place = self.vertices.binary_search(&vertex).ok()?;
+        Some(self.labels[place])
     }
-    parent.keys().map(|v| (*v, root(&parent, *v))).collect()
 }
 
 /// The scan's side of every rim edge, in the patch's order; `None` where the face there has no attributes to carry.
@@ -167,11 +193,7 @@ fn rim_edges(
         for k in 0..3 {
             if let Some(edge) = wanted.get(&(face[k], face[(k + 1) % 3])) {
                 let (to, from) = (corners[k], corners[(k + 1) % 3]);
-                edges[*edge] = Some(RimEdge {
-                    island: islands[&from],
-                    from,
-                    to,
-                });
+                edges[*edge] = islands.get(from).map(|island| RimEdge { island, from, to });
             }
         }
     }
@@ -179,12 +201,11 @@ fn rim_edges(
 }
 
 /// Which island every patch face belongs to: the one whose part of the rim is harmonically nearest.
-fn face_labels(patch: &Patch, rim: &[Option<RimEdge>], labels: &[u32]) -> Vec<Option<u32>> {
+fn face_labels(patch: &Patch, around: &Around, labels: &[u32]) -> Vec<Option<u32>> {
     if labels.len() < 2 {
         return vec![labels.first().copied(); patch.faces.len()];
     }
-    let held: Vec<u32> = (0..rim.len() as u32).collect();
-    let extension = Extension::new(&patch.flat, &patch.faces, &held);
+    let rim = &around.rim;
     let nearness: Vec<Vec<f64>> = labels
         .iter()
         .map(|label| {
@@ -196,9 +217,8 @@ fn face_labels(patch: &Patch, rim: &[Option<RimEdge>], labels: &[u32]) -> Vec<Op
             let at_rim: Vec<[f64; 1]> = (0..rim.len())
                 .map(|k| [0.5 * (on(k) + on(k + rim.len() - 1))])
                 .collect();
-            let extended = extension.as_ref().ok().and_then(|e| e.extend(&at_rim).ok());
-            extended.map_or_else(
-                || vec![0.0; patch.flat.len()],
+            around.seam.extend(&at_rim).map_or_else(
+                |_| vec![0.0; patch.flat.len()],
                 |x| x.into_iter().map(|[x]| x).collect(),
             )
         })
@@ -231,14 +251,16 @@ fn continued(
     around: &Around,
 ) -> Vec<Vec<f64>> {
     let (columns, rim) = (around.columns, &around.rim);
-    let mut samples: BTreeMap<u32, Vec2> = BTreeMap::new();
+    let mut samples: Vec<(u32, Vec2)> = Vec::new();
     for (face, corners) in region.mesh.faces.iter().zip(columns.corners) {
-        for (v, scan) in face.iter().zip(corners.iter().flatten()) {
-            if around.islands[scan] == label {
-                samples.insert(*scan, chart.flat[*v as usize]);
-            }
+        // The corners of a face are of one island.
+        if let Some(corners) = corners.filter(|c| around.islands.get(c[0]) == Some(label)) {
+            let flat = face.map(|v| chart.flat[v as usize]);
+            samples.extend(corners.into_iter().zip(flat));
         }
     }
+    samples.sort_by_key(|(scan, _)| *scan);
+    samples.dedup_by_key(|(scan, _)| *scan);
     let fit = affine_fit(&samples, columns, patch);
     let at = |p: &Vec2| -> Vec<f64> {
         (0..columns.width)
@@ -250,7 +272,14 @@ fn continued(
         .collect();
     let vertices: Vec<u32> = held.iter().map(|(k, _)| *k).collect();
     let mut values: Vec<Vec<f64>> = patch.flat.iter().map(&at).collect();
-    if let Ok(extension) = Extension::new(&patch.flat, &patch.faces, &vertices) {
+    let own;
+    let extension = if vertices.len() == rim.len() {
+        Ok(around.seam)
+    } else {
+        own = Extension::new(&patch.flat, &patch.faces, &vertices);
+        own.as_ref()
+    };
+    if let Ok(extension) = extension {
         let own: Vec<Vec<f64>> = held
             .iter()
             .map(|(_, scan)| (columns.values)(*scan))
@@ -273,7 +302,7 @@ fn continued(
 }
 
 /// Least-squares affine map from the chart to the columns, samples near the hole weighing most; rows: constant, x, y.
-fn affine_fit(samples: &BTreeMap<u32, Vec2>, columns: &Columns, patch: &Patch) -> DMatrix<f64> {
+fn affine_fit(samples: &[(u32, Vec2)], columns: &Columns, patch: &Patch) -> DMatrix<f64> {
     let rim = patch.rim.len() as f64;
     let centre = patch.flat.iter().take(patch.rim.len()).sum::<Vec2>() / rim;
     let size = patch

@@ -38,7 +38,7 @@ impl Default for Elastics {
             rest_curvature: 1.0,
             tether: 45.0,
             rounds: 300,
-            still: 1e-4,
+            still: 1e-3,
         }
     }
 }
@@ -367,7 +367,8 @@ impl Triangle {
 /// g(C) of a symmetric 2×2 matrix by its eigenvalues.
 fn spectral(c: Matrix2<f64>, g: impl Fn(f64) -> f64) -> Matrix2<f64> {
     let (mean, half) = (0.5 * (c[(0, 0)] + c[(1, 1)]), 0.5 * (c[(0, 0)] - c[(1, 1)]));
-    let radius = half.hypot(c[(0, 1)]);
+    // Not `hypot`: nothing here is near overflow, and this is asked for every triangle in every round.
+    let radius = (half * half + c[(0, 1)] * c[(0, 1)]).sqrt();
     let (high, low) = (g(mean + radius), g(mean - radius));
     if radius <= 1e-12 * mean {
         return Matrix2::identity() * high;
