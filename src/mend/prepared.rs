@@ -11,8 +11,9 @@ use crate::edit::{HoleCells, Reach};
 use crate::flatten::{self, Chart};
 use crate::grid::{self, CELLS, Grid, NormalGrid, Normalisation};
 use crate::mesh::denoise::{Filter, denoised};
+use crate::mesh::layers::layers_near;
 use crate::mesh::region::{self, Region};
-use crate::mesh::{Vec2, Vec3};
+use crate::mesh::{TriMesh, Vec2, Vec3};
 use crate::net::{self, Averaging};
 use crate::patch::{self, Patch, PatchError, Plan};
 
@@ -39,6 +40,8 @@ pub struct Prepared {
     pub chart: Chart,
     /// How it will be meshed.
     pub plan: Plan,
+    /// Cloth of the scan near the hole that is not of its region.
+    pub others: TriMesh,
     /// What the grid knows of the scan.
     pub grid: Grid,
     /// Brings the grid to the network's units and back.
@@ -79,8 +82,8 @@ impl Prepared {
         let mut reach = reach_for(extent_at_a_glance(cloth, id));
         let mut tries = 0;
         loop {
-            let outcome =
-                Laid::out(cloth, id, reach, limits).and_then(|laid| laid.sampled(id, limits));
+            let outcome = Laid::out(cloth, id, reach, limits)
+                .and_then(|laid| laid.sampled(cloth, id, limits));
             tries += 1;
             match outcome {
                 Err(error) if tries < TRIES && may_shrink(&error) => reach *= SMALLER,
@@ -186,8 +189,9 @@ impl Prepared {
 
     /// Bytes of memory it holds, about.
     pub fn bytes(&self) -> usize {
-        let mesh = |m: &crate::mesh::TriMesh| 24 * m.positions.len() + 12 * m.faces.len();
+        let mesh = |m: &TriMesh| 24 * m.positions.len() + 12 * m.faces.len();
         let region = mesh(&self.region.mesh)
+            + mesh(&self.others)
             + 4 * (self.region.vertices.len() + self.region.faces.len())
             + 16 * self.chart.flat.len();
         // Known flag, position, place among the hole's cells, base.
@@ -272,7 +276,7 @@ impl Laid {
     }
 
     /// Samples the grid and plans the patch.
-    fn sampled(self, id: u32, limits: &Limits) -> Result<Prepared, MendError> {
+    fn sampled(self, cloth: &Cloth, id: u32, limits: &Limits) -> Result<Prepared, MendError> {
         let seen = self.smooth.as_ref().unwrap_or(&self.region);
         let polygon = self.rim_uv();
         let sample = || {
@@ -289,17 +293,20 @@ impl Laid {
         };
         let plan = || {
             let started = Instant::now();
+            // As far as cloth of the hole's extent can be from its rim.
+            let beyond = 0.5 * extent(&polygon) * self.chart.frame.side;
+            let others = layers_near(&cloth.welded.mesh, &self.region, beyond);
             let plan = patch::plan(seen, &self.chart, &limits.patch)
                 .and_then(|plan| match &self.smooth {
                     Some(_) => plan.joining(&self.region.mesh.positions),
                     None => Ok(plan),
                 })
                 .map_err(|source| MendError::Patch { hole: id, source })?;
-            Ok::<_, MendError>((plan, milliseconds(started)))
+            Ok::<_, MendError>((plan.among(&others), others, milliseconds(started)))
         };
         let (sampled, planned) = rayon::join(sample, plan);
         let (grid, normal, cells, base, raster) = sampled?;
-        let (plan, patch) = planned?;
+        let (plan, others, patch) = planned?;
         let report = grid_report(&grid, &normal, &polygon);
         let timings = v1::HoleTimings {
             raster,
@@ -316,6 +323,7 @@ impl Laid {
         Ok(Prepared {
             id,
             plan,
+            others,
             grid,
             normal,
             cells,

@@ -9,6 +9,7 @@ pub mod denoise;
 pub mod geodesic;
 mod growth;
 pub mod intersect;
+pub mod layers;
 pub mod loops;
 pub mod nearest;
 pub mod region;

@@ -62,6 +62,24 @@ impl Surroundings {
         }
     }
 
+    /// The same with other cloth that the patch must not cut: layers that lie over or under it, beyond the region.
+    pub fn among(mut self, others: &TriMesh) -> Surroundings {
+        let (base, more) = (self.positions.len() as u32, others.positions.len() as u32);
+        // The patch's inner vertices come after all that is held.
+        let moved = |v: u32| if v < base { v } else { v + more };
+        for face in &mut self.faces[self.first_face..] {
+            *face = face.map(moved);
+        }
+        for (a, b, _) in &mut self.edges {
+            (*a, *b) = (moved(*a), moved(*b));
+        }
+        self.positions.extend_from_slice(&others.positions);
+        let held = others.faces.iter().map(|f| f.map(|v| base + v));
+        self.faces.splice(self.first_face..self.first_face, held);
+        self.first_face += others.faces.len();
+        self
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.positions[..])
@@ -272,5 +290,34 @@ mod tests {
         let again = patch.positions.clone();
         assert_eq!(around.separate(&mut patch), 0);
         assert_eq!(patch.positions, again, "what does not cross is left alone");
+
+        // Where all of the cloth below is another layer, the same comes of it.
+        let layer = TriMesh {
+            positions: around.positions.clone(),
+            faces: around.faces[..first_face].to_vec(),
+        };
+        let own = |v: u32| v - base;
+        let alone = Surroundings {
+            positions: Vec::new(),
+            faces: around.faces[first_face..]
+                .iter()
+                .map(|f| f.map(own))
+                .collect(),
+            first_face: 0,
+            edges: around
+                .edges
+                .iter()
+                .map(|(a, b, l)| (own(*a), own(*b), *l))
+                .collect(),
+            edge: 1.0,
+        };
+        patch.positions = tile;
+        assert_eq!(
+            alone.clone().separate(&mut patch),
+            0,
+            "it does not cut itself"
+        );
+        assert_eq!(alone.among(&layer).separate(&mut patch), before);
+        assert_eq!(patch.positions, again);
     }
 }

@@ -12,7 +12,7 @@ mod touch;
 use crate::flatten::Chart;
 use crate::grid;
 use crate::mesh::region::Region;
-use crate::mesh::{Vec2, Vec3};
+use crate::mesh::{TriMesh, Vec2, Vec3};
 
 /// Everything about a patch that does not depend on what fills the hole; owned, so that a session can keep it.
 pub struct Plan {
@@ -74,6 +74,12 @@ impl Plan {
         let spread = self.seam.extend(&gaps).map_err(|_| singular("seam"))?;
         self.shift = Some(spread.into_iter().map(Vec3::from).collect());
         Ok(self)
+    }
+
+    /// Keeps the cloth from cutting other layers of the scan, too, not only its region.
+    pub fn among(mut self, others: &TriMesh) -> Plan {
+        self.surroundings = self.surroundings.among(others);
+        self
     }
 
     /// All vertices in the plane of the chart, scene units; the rim's come first.

@@ -22,8 +22,8 @@ pub struct Quality {
     pub self_intersections: usize,
 }
 
-/// Measures a patch against its chart and the region it closes.
-pub fn measure(patch: &Patch, region: &Region) -> Quality {
+/// Measures a patch against its chart, the region it closes, and other layers of the scan that it may cut.
+pub fn measure(patch: &Patch, region: &Region, others: &TriMesh) -> Quality {
     let (mut edges, mut sum, mut most) = (0usize, 0.0, 0.0f64);
     let mut area = 0.0;
     let mut angles = vec![0.0; patch.positions.len()];
@@ -57,7 +57,7 @@ pub fn measure(patch: &Patch, region: &Region) -> Quality {
         stretch_max: if edges == 0 { 1.0 } else { most },
         gaussian_curvature: defects / inner.len().max(1) as f64,
         seam_gap: patch.rim.iter().enumerate().map(gap).fold(0.0, f64::max),
-        self_intersections: cuts(patch, region),
+        self_intersections: cuts(patch, region, others),
     }
 }
 
@@ -77,7 +77,12 @@ pub fn joined(patch: &Patch, region: &Region) -> TriMesh {
     mesh
 }
 
-fn cuts(patch: &Patch, region: &Region) -> usize {
-    let mesh = joined(patch, region);
-    crossings(&mesh, region.mesh.faces.len()).len()
+fn cuts(patch: &Patch, region: &Region, others: &TriMesh) -> usize {
+    let mut mesh = joined(patch, region);
+    let (base, first) = (mesh.positions.len() as u32, region.mesh.faces.len());
+    mesh.positions.extend_from_slice(&others.positions);
+    let others = others.faces.iter().map(|f| f.map(|v| base + v));
+    let first_of_patch = first + others.len();
+    mesh.faces.splice(first..first, others);
+    crossings(&mesh, first_of_patch).len()
 }

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::flatten::{Frame, Limits, flatten};
+use crate::mesh::TriMesh;
 use crate::mesh::loops::{LoopKind, boundary_loops};
 use crate::mesh::region;
 use crate::mesh::shapes::sheet;
@@ -59,8 +60,8 @@ fn pulled(slack: f64, to: Vec3, hold: Hold) -> (Patch, Patch, Vec3, f64) {
         "the rim does not move"
     );
     let off = (patch.at(pull.at) - pull.to).norm();
-    let stretch = quality::measure(&patch, &region).stretch_max;
-    let usual = quality::measure(&free, &region).stretch_max;
+    let stretch = quality::measure(&patch, &region, &TriMesh::default()).stretch_max;
+    let usual = quality::measure(&free, &region, &TriMesh::default()).stretch_max;
     assert!(
         stretch <= (1.05 * usual).max(1.25) + 1e-9,
         "{stretch} {usual}"
