@@ -110,8 +110,8 @@ pub fn settings(backend: Backend, autodiff: Autodiff) -> Result<Settings, Failur
         (Autodiff::Burn, BackendKind::Engine) => Some(BackendKind::Flex),
         _ => None,
     };
-    // Copies of a grid, and places of a search, are shared out to all processors; a single grid is one thread's.
-    let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    // Copies of a grid, and places of a search, are shared out to all threads; a single grid is one thread's.
+    let threads = rayon::current_num_threads();
     Ok(Settings {
         backend,
         autodiff,

@@ -29,6 +29,11 @@ pub struct ServeArgs {
     #[arg(long, env = "DARN_WORKERS", value_name = "N", value_parser = workers)]
     pub workers: Option<usize>,
 
+    /// Threads that all workers share for what can be divided (a mend's copies of a grid, its holes), at most 1024; left out, one per
+    /// processor
+    #[arg(long, env = "DARN_THREADS", value_name = "N", value_parser = workers)]
+    pub threads: Option<usize>,
+
     /// Scans that may wait for a worker, at most 65536; more are refused with 503
     #[arg(long, env = "DARN_QUEUE", value_name = "N", default_value = "32", value_parser = queue)]
     pub queue: usize,
