@@ -17,6 +17,9 @@ const MORE: f64 = 1.05;
 /// How often pulls go less far before they are given up.
 const EASINGS: usize = 8;
 
+/// Most rounds of strain limiting under one length of pulls.
+const ROUNDS: usize = 60;
+
 impl Plan {
     /// Draws the cloth, at rest where it lies, to where the pulls want it, as far as its strain allows; the rounds.
     pub(super) fn pull(
@@ -35,6 +38,11 @@ impl Plan {
         let bound = STRETCH.max(MORE * before);
         let drawn = fabric.at_rest(positions);
         self.lift(positions, grips)?;
+        // Cloth that is pulled creeps on for long, by less than can be seen.
+        let elastics = &Elastics {
+            rounds: ROUNDS.min(elastics.rounds),
+            ..*elastics
+        };
         let mut rounds = 0;
         for _ in 0..=EASINGS {
             rounds += fabric.settle(&drawn, positions, elastics, &ready)?.rounds;
