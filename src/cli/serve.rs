@@ -11,8 +11,10 @@ pub fn run(settings: &ServeArgs) -> Result<(), Failure> {
     start_logging(&settings.log, settings.log_format)
         .map_err(|error| Failure::Usage(format!("--log {}: {error}", settings.log)))?;
     if let Some(threads) = settings.threads {
-        (rayon::ThreadPoolBuilder::new().num_threads(threads).build_global())
-            .or_fail("start threads")?;
+        (rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global())
+        .or_fail("start threads")?;
     }
     let mender = network::mender(
         settings.weights.as_deref(),

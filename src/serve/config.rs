@@ -25,7 +25,7 @@ pub struct ServeArgs {
     #[arg(long, env = "DARN_GRPC_LISTEN", value_name = "ADDRESS")]
     pub grpc_listen: Option<SocketAddr>,
 
-    /// Scans mended at once, at most 1024; left out, one per processor
+    /// Scans mended at once, at most 1024; left out, two per processor
     #[arg(long, env = "DARN_WORKERS", value_name = "N", value_parser = workers)]
     pub workers: Option<usize>,
 
@@ -138,10 +138,10 @@ pub enum Autodiff {
 }
 
 impl ServeArgs {
-    /// Worker threads: as set, else one per processor.
+    /// Worker threads: as set, else two per processor, as one waits while the shared threads do what can be divided.
     pub fn workers(&self) -> usize {
         self.workers.unwrap_or_else(|| {
-            std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+            2 * std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
         })
     }
 
