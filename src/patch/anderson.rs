@@ -61,12 +61,8 @@ impl Anderson {
         for (p, x) in positions.iter_mut().zip(step) {
             *p = Vec3::from(*x);
         }
-        for (share, d) in self
-            .shares(&residual)
-            .iter()
-            .zip(&self.steps)
-            .take(self.used)
-        {
+        let shares = self.shares(&residual);
+        for (share, d) in shares.iter().zip(&self.steps).take(self.used) {
             for (p, d) in positions.iter_mut().zip(d.as_chunks::<3>().0) {
                 *p -= Vec3::from(*d) * *share;
             }

@@ -272,12 +272,12 @@ fn continued(
         .collect();
     let vertices: Vec<u32> = held.iter().map(|(k, _)| *k).collect();
     let mut values: Vec<Vec<f64>> = patch.flat.iter().map(&at).collect();
-    let own;
+    let from_part;
     let extension = if vertices.len() == rim.len() {
         Ok(around.seam)
     } else {
-        own = Extension::new(&patch.flat, &patch.faces, &vertices);
-        own.as_ref()
+        from_part = Extension::new(&patch.flat, &patch.faces, &vertices);
+        from_part.as_ref()
     };
     if let Ok(extension) = extension {
         let own: Vec<Vec<f64>> = held

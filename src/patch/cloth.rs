@@ -61,7 +61,7 @@ pub struct Fabric {
     /// A third of the area of the triangles around each free vertex.
     lumped: Vec<f64>,
     /// Mean edge length at rest.
-    pub edge: f64,
+    edge: f64,
     bending: f64,
     tether: f64,
     factor: Option<Factor>,

@@ -50,8 +50,9 @@ impl Hold {
     }
 }
 
-/// A pull in terms of the free vertices: Σ weight · position = goal.
+/// A pull in terms of the free vertices.
 struct Row {
+    /// The point: Σ weight · position.
     terms: Vec<(usize, f64)>,
     /// How its force is shared out; the shares add up to one.
     force: Vec<(usize, f64)>,

@@ -111,35 +111,20 @@ fn a_pull_to_where_the_cloth_is_changes_next_to_nothing() {
 }
 
 #[test]
-fn a_pull_beside_the_hole_does_nothing() {
+fn a_pull_beside_the_hole_or_at_its_rim_does_nothing() {
     let (region, chart, filled) = wavy(1.0);
     let (plan, free, _) = unpulled(&region, &chart, &filled);
-    let pull = Pull {
-        at: chart.frame.point(Vec2::new(0.02, 0.02)),
-        to: Vec3::zeros(),
-        hold: Hold::Hard,
-    };
-    assert_eq!(
-        plan.patch(&chart, &filled, &[pull], &Options::default())
-            .unwrap(),
-        free
-    );
-}
-
-#[test]
-fn a_pull_at_the_rim_does_nothing() {
-    let (region, chart, filled) = wavy(1.0);
-    let (plan, free, _) = unpulled(&region, &chart, &filled);
-    let pull = Pull {
-        at: plan.flat()[0],
-        to: Vec3::zeros(),
-        hold: Hold::Soft,
-    };
-    assert_eq!(
-        plan.patch(&chart, &filled, &[pull], &Options::default())
-            .unwrap(),
-        free
-    );
+    let beside = (chart.frame.point(Vec2::new(0.02, 0.02)), Hold::Hard);
+    let at_rim = (plan.flat()[0], Hold::Soft);
+    for (at, hold) in [beside, at_rim] {
+        let to = Vec3::zeros();
+        let pull = Pull { at, to, hold };
+        assert_eq!(
+            plan.patch(&chart, &filled, &[pull], &Options::default())
+                .unwrap(),
+            free
+        );
+    }
 }
 
 /// A finger moves the cloth about it, not one triangle: beside a pulled point its neighbours have come most of the way.

@@ -16,7 +16,6 @@ const STRETCH: f64 = 1.25;
 const MORE: f64 = 1.05;
 /// How often pulls go less far before they are given up.
 const EASINGS: usize = 8;
-
 /// Most rounds of strain limiting under one length of pulls.
 const ROUNDS: usize = 60;
 
