@@ -110,7 +110,7 @@ pub fn settings(backend: Backend, autodiff: Autodiff) -> Result<Settings, Failur
         (Autodiff::Burn, BackendKind::Engine) => Some(BackendKind::Flex),
         _ => None,
     };
-    // Copies of a grid, and places of a search, are shared out to all threads; a single grid is one thread's.
+    // Copies of a grid, and places of a search, are shared out to all threads; a single grid's layers, too.
     let threads = rayon::current_num_threads();
     Ok(Settings {
         backend,

@@ -67,19 +67,16 @@ pub fn addition(
         owner.map_or_else(Vec::new, |(_, p)| columns_of(&scan.parts[*p], s))
     };
     let width = 2 * look.texcoords.len() + 4 * look.colors.len();
-    let dressed = dress(
-        (&prepared.plan, patch),
-        region,
-        chart,
-        &Columns {
-            corners: &corners,
-            any: &any,
-            values: &values,
-            width,
-        },
+    let columns = Columns {
+        corners: &corners,
+        any: &any,
+        values: &values,
+        width,
+    };
+    let (dressed, normals) = rayon::join(
+        || dress((&prepared.plan, patch), region, chart, &columns),
+        || normals(patch, region),
     );
-
-    let normals = normals(patch, region);
     let points = dressed.corners.iter().map(|c| match c.scan {
         Some(s) => PatchPoint::Scan(s),
         None => PatchPoint::New(patch.positions[c.vertex as usize]),

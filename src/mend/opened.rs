@@ -169,7 +169,7 @@ impl Opened {
     /// # Errors
     /// None today; see [`dress::addition`].
     pub fn additions(&self, scan: &Scan, patched: &Patched) -> Result<Vec<Addition>, MendError> {
-        let each = patched.holes.iter().map(|(prepared, made)| {
+        let each = patched.holes.par_iter().map(|(prepared, made)| {
             dress::addition(
                 (scan, &self.cloth),
                 prepared,

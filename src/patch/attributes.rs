@@ -20,7 +20,7 @@ pub struct Columns<'a> {
     /// Per region vertex: one scan vertex at its place, whatever its attributes.
     pub any: &'a [u32],
     /// The columns of one scan vertex; always `width` long.
-    pub values: &'a dyn Fn(u32) -> Vec<f64>,
+    pub values: &'a (dyn Fn(u32) -> Vec<f64> + Sync),
     /// Number of columns.
     pub width: usize,
 }

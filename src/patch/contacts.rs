@@ -87,8 +87,8 @@ impl Surroundings {
             + size_of_val(&self.edges[..])
     }
 
-    /// Moves inner vertices of the patch until nothing crosses, or as little as can be had; how many crossing pairs that took away.
-    pub fn separate(&self, patch: &mut Patch) -> usize {
+    /// Moves inner vertices of the patch until nothing crosses, or as little as can be had; the patch counts what that took away and left.
+    pub fn separate(&self, patch: &mut Patch) {
         let (rim, base) = (patch.rim.len(), self.positions.len());
         let mut positions = self.positions.clone();
         positions.extend_from_slice(&patch.positions[rim..]);
@@ -113,7 +113,8 @@ impl Surroundings {
                 patch.positions[rim..].copy_from_slice(&mesh.positions[base..]);
             }
         }
-        found - least
+        patch.collisions += found - least;
+        patch.crossings = Some(least);
     }
 
     /// One step along the gradients of the crossing curves.
@@ -278,6 +279,7 @@ mod tests {
             faces: tile_faces,
             strain_rounds: 0,
             collisions: 0,
+            crossings: None,
         };
         let joined = |tile: &[Vec3]| TriMesh {
             positions: around.positions.iter().chain(tile).copied().collect(),
@@ -285,10 +287,12 @@ mod tests {
         };
         let before = crossings(&joined(&tile), first_face).len();
         assert!(before > 0);
-        assert_eq!(around.separate(&mut patch), before);
+        around.separate(&mut patch);
+        assert_eq!((patch.collisions, patch.crossings), (before, Some(0)));
         assert_eq!(crossings(&joined(&patch.positions), first_face), []);
         let again = patch.positions.clone();
-        assert_eq!(around.separate(&mut patch), 0);
+        around.separate(&mut patch);
+        assert_eq!(patch.collisions, before, "counted once");
         assert_eq!(patch.positions, again, "what does not cross is left alone");
 
         // Where all of the cloth below is another layer, the same comes of it.
@@ -311,13 +315,11 @@ mod tests {
                 .collect(),
             edge: 1.0,
         };
-        patch.positions = tile;
-        assert_eq!(
-            alone.clone().separate(&mut patch),
-            0,
-            "it does not cut itself"
-        );
-        assert_eq!(alone.among(&layer).separate(&mut patch), before);
+        (patch.positions, patch.collisions) = (tile, 0);
+        alone.clone().separate(&mut patch);
+        assert_eq!(patch.collisions, 0, "it does not cut itself");
+        alone.among(&layer).separate(&mut patch);
+        assert_eq!((patch.collisions, patch.crossings), (before, Some(0)));
         assert_eq!(patch.positions, again);
     }
 }

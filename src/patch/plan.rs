@@ -146,8 +146,9 @@ impl Plan {
             faces: self.tiled.faces.clone(),
             strain_rounds: rest.map_err(|_| singular("strain"))?.rounds,
             collisions: 0,
+            crossings: None,
         };
-        patch.collisions = self.surroundings.separate(&mut patch);
+        self.surroundings.separate(&mut patch);
         let grips = self.grips(pulls, chart);
         if !grips.is_empty() {
             let inner = patch.positions[self.own.len()..].to_vec();
@@ -155,7 +156,10 @@ impl Plan {
             let rounds = self.pull(fabric, &mut positions, &grips, elastics);
             patch.strain_rounds += rounds.map_err(|_| singular("strain"))?;
             patch.positions = self.with_rim(&positions);
-            patch.collisions += self.surroundings.separate(&mut patch);
+            self.surroundings.separate(&mut patch);
+        }
+        if self.shift.is_some() {
+            patch.crossings = None;
         }
         for (p, shift) in patch.positions.iter_mut().zip(self.shift.iter().flatten()) {
             *p += shift;

@@ -57,7 +57,7 @@ pub fn measure(patch: &Patch, region: &Region, others: &TriMesh) -> Quality {
         stretch_max: if edges == 0 { 1.0 } else { most },
         gaussian_curvature: defects / inner.len().max(1) as f64,
         seam_gap: patch.rim.iter().enumerate().map(gap).fold(0.0, f64::max),
-        self_intersections: cuts(patch, region, others),
+        self_intersections: (patch.crossings).unwrap_or_else(|| cuts(patch, region, others)),
     }
 }
 

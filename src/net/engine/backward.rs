@@ -1,7 +1,7 @@
 //! The adjoint pass: from the gradient with respect to the network's last features to the one with respect to its input.
 
-use super::convolve::{Finish, Source, Work};
-use super::forward::{Activations, Saved, all, levels, whole};
+use super::convolve::{Finish, Work};
+use super::forward::{Activations, Saved, levels};
 use super::map::{Map, panels};
 use super::network::{DOWN, Folds, Forward, Reverse, side};
 use super::pack::Layer;
@@ -11,7 +11,9 @@ use super::sums::WeightSums;
 /// Room for the gradients of some images, by the name of what they are with respect to.
 #[derive(Debug)]
 pub struct Gradients {
-    pub work: Work,
+    /// As those of the activations.
+    works: Vec<Work>,
+    pub threads: usize,
     pub input: Map,
     /// By level: between the convolutions of a block, first of the one up, then of the one down.
     middle: Vec<Map>,
@@ -29,18 +31,20 @@ fn layers(reverse: &Reverse) -> impl Iterator<Item = &Layer> {
 }
 
 impl Gradients {
-    /// Images there is room for.
-    pub fn images(&self) -> usize {
-        self.input.images()
+    /// As [`Activations::size`].
+    pub fn size(&self) -> [usize; 2] {
+        [self.input.images(), self.works.len()]
     }
 
-    pub fn new(images: usize, folds: &Folds, reverse: &Reverse) -> Gradients {
+    /// Room for so many images, a single one shared out to so many threads.
+    pub fn new([images, threads]: [usize; 2], folds: &Folds, reverse: &Reverse) -> Gradients {
         let width = folds.width;
         let channels = |level: usize| width << level;
         let half = |level: usize| Map::new(images, panels(channels(level)), side(level + 1));
         let joined = |level: usize| Map::new(images, 2 * panels(channels(level)), side(level));
         Gradients {
-            work: Work::of(layers(reverse)),
+            threads,
+            works: (0..threads).map(|_| Work::of(layers(reverse))).collect(),
             input: Map::new(images, 1, side(0)),
             middle: levels(images, DOWN + 1, channels),
             result: levels(images, DOWN + 1, channels),
@@ -59,39 +63,41 @@ impl Gradients {
         (activations, saved): (&Activations, &Saved),
         mut sums: Option<&mut WeightSums>,
     ) {
-        let work = &mut self.work;
+        let works = &mut self.works[..self.threads];
         for level in 0..DOWN {
             let up = &reverse.up[level];
             let [first, second] = &up.block;
             let (result, middle) = (&self.result[level], &mut self.middle[level]);
             let gate = Finish::Gate(&saved.middle[level]);
-            second.run((target, work), images, all(result), whole(middle), gate);
+            second.run((target, works), images, result.all(), middle.whole(), gate);
             let mut sums = sums.as_deref_mut().map(|sums| &mut sums.up[level]);
             if let Some(sums) = &mut sums {
                 let [first, second] = &mut sums.block;
-                second.add(target, images, all(&saved.middle[level]), all(result));
-                first.add(target, images, all(&activations.joined[level]), all(middle));
+                second.add(target, images, saved.middle[level].all(), result.all());
+                first.add(
+                    target,
+                    images,
+                    activations.joined[level].all(),
+                    middle.all(),
+                );
             }
             let joined = &mut self.joined[level];
             first.run(
-                (target, work),
+                (target, works),
                 images,
-                all(middle),
-                whole(joined),
+                middle.all(),
+                joined.whole(),
                 Finish::Plain,
             );
             let cells = images * side(level) * side(level);
             up.gate.run(
-                (target, work),
+                (target, &mut works[0]),
                 &network.up[level].gate,
                 (&activations.skip[level], &activations.joined[level]),
                 (&activations.open[level][..cells], &saved.joint[level]),
                 (joined, sums.as_deref_mut().map(|sums| &mut sums.gate)),
             );
-            let signal = Source {
-                first: joined.panels / 2,
-                map: joined,
-            };
+            let signal = joined.from(joined.panels / 2);
             let below = saved.result.get(level + 1);
             let below = below.unwrap_or(&activations.skip[level + 1]);
             if let Some(sums) = sums {
@@ -100,7 +106,7 @@ impl Gradients {
             let below = Finish::Gate(below);
             let result = &mut self.result[level + 1];
             up.conv
-                .run((target, work), images, signal, whole(result), below);
+                .run((target, works), images, signal, result.whole(), below);
         }
         for level in (0..=DOWN).rev() {
             if level < DOWN {
@@ -117,15 +123,20 @@ impl Gradients {
             let [first, second] = &reverse.down[level];
             let (result, middle) = (&self.result[level], &mut self.middle[level]);
             let gate = Finish::Gate(&activations.middle[level]);
-            second.run((target, work), images, all(result), whole(middle), gate);
+            second.run((target, works), images, result.all(), middle.whole(), gate);
             if let Some(sums) = sums.as_deref_mut() {
                 let [first, second] = &mut sums.down[level];
                 let x = match level {
                     0 => &activations.input,
                     _ => &activations.pooled[level - 1],
                 };
-                second.add(target, images, all(&activations.middle[level]), all(result));
-                first.add(target, images, all(x), all(middle));
+                second.add(
+                    target,
+                    images,
+                    activations.middle[level].all(),
+                    result.all(),
+                );
+                first.add(target, images, x.all(), middle.all());
                 if level == 0 {
                     return;
                 }
@@ -135,10 +146,10 @@ impl Gradients {
                 _ => &mut self.pooled[level - 1],
             };
             first.run(
-                (target, work),
+                (target, works),
                 images,
-                all(middle),
-                whole(input),
+                middle.all(),
+                input.whole(),
                 Finish::Plain,
             );
         }

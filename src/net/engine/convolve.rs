@@ -1,7 +1,9 @@
 //! 3×3 convolutions, sixteen tiles at a time: transform in, multiply, transform back, and what follows a convolution while its result
 //! is still in registers.
 
-use super::map::Map;
+use std::ops::Range;
+
+use super::map::{Map, Sink, Source};
 use super::pack::{Layer, Plan};
 use super::scheme::{Down, Four, Scheme, Two, Up};
 use super::simd::{Block, Kernel, LANES, Simd, Target};
@@ -56,43 +58,124 @@ pub enum Finish<'a> {
     /// Bias and ReLU.
     Relu,
     /// Bias and ReLU, and the largest of every 2×2 cells into another map.
-    ReluPool(&'a mut Map),
+    ReluPool(Sink<'a>),
     /// No bias; zero where the saved activation is zero (the adjoint of a ReLU).
     Gate(&'a Map),
     /// No bias, nothing.
     Plain,
 }
 
-/// The panels of a map from `first` on.
-#[derive(Clone, Copy)]
-pub struct Source<'a> {
-    pub map: &'a Map,
-    pub first: usize,
+/// Where a layer's result goes, and what is done to it on the way.
+struct Output<'a> {
+    y: Sink<'a>,
+    finish: Finish<'a>,
 }
 
-/// The panels of a map from `first` on.
-pub struct Sink<'a> {
-    pub map: &'a mut Map,
-    pub first: usize,
+impl<'a> Output<'a> {
+    /// What lies before a row of cells of a panel of the first image, and the rest.
+    fn split(self, panel: usize, row: usize) -> [Output<'a>; 2] {
+        let (low, high) = self.y.split(panel, row + 1);
+        let (first, second) = match self.finish {
+            Finish::Relu => (Finish::Relu, Finish::Relu),
+            Finish::ReluPool(pooled) => {
+                let (low, high) = pooled.split(panel, row / 2 + 1);
+                (Finish::ReluPool(low), Finish::ReluPool(high))
+            }
+            Finish::Gate(saved) => (Finish::Gate(saved), Finish::Gate(saved)),
+            Finish::Plain => (Finish::Plain, Finish::Plain),
+        };
+        [(low, first), (high, second)].map(|(y, finish)| Output { y, finish })
+    }
+}
+
+/// A part of a layer's result.
+#[derive(Clone)]
+struct Part {
+    /// Tiles, counted through all images.
+    tiles: Range<usize>,
+    panels: Range<usize>,
+}
+
+impl Part {
+    /// In two, the first `share` ÷ `of` of it: between panels, or between rows of `side` tiles where it is of one panel, so that either is
+    /// one stretch of memory. None where there is nothing to cut.
+    fn cut(&self, side: usize, [share, of]: [usize; 2]) -> Option<[Part; 2]> {
+        let (mut low, mut high) = (self.clone(), self.clone());
+        let (panels, rows) = (self.panels.len(), self.tiles.len() / side);
+        if panels > 1 {
+            low.panels.end = self.panels.start + (panels * share / of).max(1);
+            high.panels.start = low.panels.end;
+        } else if rows > 1 {
+            low.tiles.end = self.tiles.start + (rows * share / of).max(1) * side;
+            high.tiles.start = low.tiles.end;
+        } else {
+            return None;
+        }
+        Some([low, high])
+    }
 }
 
 impl Layer {
-    /// Convolves `images` images.
+    /// Convolves `images` images; a single one on as many threads as there are works.
     pub fn run(
         &self,
-        (target, work): (Target, &mut Work),
+        (target, works): (Target, &mut [Work]),
         images: usize,
         x: Source,
-        mut y: Sink,
-        mut finish: Finish,
+        y: Sink,
+        finish: Finish,
     ) {
         let tiles = Tiles::new(x.map.side / self.plan.step(), images);
+        let all = Part {
+            tiles: 0..tiles.total,
+            panels: 0..self.to,
+        };
+        let works = if images == 1 { works } else { &mut works[..1] };
+        self.share((target, works), (all, tiles), x, Output { y, finish });
+    }
+
+    /// Makes a part on as many threads as there are works.
+    fn share(
+        &self,
+        (target, works): (Target, &mut [Work]),
+        (part, tiles): (Part, Tiles),
+        x: Source,
+        output: Output,
+    ) {
+        let (half, of) = (works.len() / 2, works.len());
+        let cut = if half > 0 {
+            part.cut(tiles.side, [half, of])
+        } else {
+            None
+        };
+        match (cut, works) {
+            (Some([low, high]), works) => {
+                let row = high.tiles.start / tiles.side * self.plan.cells();
+                let [before, after] = output.split(high.panels.start, row);
+                let (few, others) = works.split_at_mut(half);
+                rayon::join(
+                    || self.share((target, few), (low, tiles), x, before),
+                    || self.share((target, others), (high, tiles), x, after),
+                );
+            }
+            (None, [work, ..]) => self.make((target, work), (part, tiles), x, output),
+            (None, []) => {}
+        }
+    }
+
+    /// Makes a part.
+    fn make(
+        &self,
+        (target, work): (Target, &mut Work),
+        (part, tiles): (Part, Tiles),
+        x: Source,
+        mut output: Output,
+    ) {
         let frequencies = self.plan.frequencies();
-        let mut first = 0;
-        while first < tiles.total {
+        for first in part.tiles.clone().step_by(TILES) {
             let round = Tiles {
                 first,
-                count: TILES.min(tiles.total - first),
+                count: TILES.min(part.tiles.end - first),
                 ..tiles
             };
             target.run(Enter {
@@ -107,8 +190,8 @@ impl Layer {
                 5..=8 => 2,
                 _ => 1,
             };
-            for panel in (0..self.to).step_by(group) {
-                let panels = panel..(panel + group).min(self.to);
+            for panel in part.panels.clone().step_by(group) {
+                let panels = panel..(panel + group).min(part.panels.end);
                 target.run(Multiply {
                     input: &work.input,
                     depth: self.from,
@@ -122,11 +205,9 @@ impl Layer {
                     tiles: round,
                     panels,
                     products: &work.products,
-                    y: &mut y,
-                    finish: &mut finish,
+                    output: &mut output,
                 });
             }
-            first += TILES;
         }
     }
 }
@@ -355,16 +436,15 @@ fn product<S: Simd, const M: usize, const N: usize>(
 }
 
 /// Frequencies to cells.
-struct Leave<'a, 'b, 'c> {
+struct Leave<'a, 'b> {
     layer: &'a Layer,
     tiles: Tiles,
-    panels: std::ops::Range<usize>,
+    panels: Range<usize>,
     products: &'a [Block],
-    y: &'a mut Sink<'b>,
-    finish: &'a mut Finish<'c>,
+    output: &'a mut Output<'b>,
 }
 
-impl Kernel for Leave<'_, '_, '_> {
+impl Kernel for Leave<'_, '_> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         match self.layer.plan {
@@ -376,7 +456,7 @@ impl Kernel for Leave<'_, '_, '_> {
     }
 }
 
-impl Leave<'_, '_, '_> {
+impl Leave<'_, '_> {
     #[inline(always)]
     fn tiles<S: Simd, T, const I: usize, const F: usize, const O: usize>(self, s: S)
     where
@@ -400,14 +480,14 @@ impl Leave<'_, '_, '_> {
                     }
                 }
                 let [image, row, column] = self.tiles.place(tile);
-                let map = &mut *self.y.map;
-                let (first, stride) = (self.y.first, map.stride());
-                let start = map.index([image, first + panel], [row * O + 1, column * O + 1]);
+                let Output { y, finish } = &mut *self.output;
+                let stride = y.stride;
+                let start = y.index([image, panel], [row * O + 1, column * O + 1]);
                 let mut cells = [[s.splat(0.0); O]; O];
                 for o in 0..O {
                     cells[o] = T::leave(s, half[o]);
                 }
-                match self.finish {
+                match finish {
                     Finish::Relu | Finish::ReluPool(_) => {
                         for cell in cells.iter_mut().flatten() {
                             *cell = s.max(s.add(*cell, bias), s.splat(0.0));
@@ -425,15 +505,15 @@ impl Leave<'_, '_, '_> {
                     Finish::Plain => {}
                 }
                 for (r, cells) in cells.iter().enumerate() {
-                    let to = &mut map.blocks[start + r * stride..][..O];
+                    let to = &mut y.blocks[start + r * stride..][..O];
                     for (cell, to) in cells.iter().zip(to) {
                         s.store(*cell, to);
                     }
                 }
-                if let Finish::ReluPool(pooled) = self.finish {
+                if let Finish::ReluPool(pooled) = finish {
                     let corner = [row * O / 2 + 1, column * O / 2 + 1];
                     let start = pooled.index([image, panel], corner);
-                    let stride = pooled.stride();
+                    let stride = pooled.stride;
                     for r in 0..O / 2 {
                         for c in 0..O / 2 {
                             let upper = s.max(cells[2 * r][2 * c], cells[2 * r][2 * c + 1]);

@@ -1,6 +1,6 @@
 //! The network's forward pass over maps: room for its activations, and the way through them.
 
-use super::convolve::{Finish, Sink, Source, Work};
+use super::convolve::{Finish, Work};
 use super::map::{Map, panels};
 use super::network::{DOWN, Folds, Forward, side};
 use super::pack::Layer;
@@ -9,8 +9,11 @@ use super::simd::{Block, Target};
 /// Room for a forward pass of some images.
 #[derive(Debug)]
 pub struct Activations {
-    pub images: usize,
-    pub work: Work,
+    images: usize,
+    /// One for each thread that a single image may be shared out to.
+    works: Vec<Work>,
+    /// How many of them are in use.
+    pub threads: usize,
     /// What the network sees: four channels of one panel.
     pub input: Map,
     /// By level: between the two convolutions of a block.
@@ -51,14 +54,16 @@ fn layers(network: &Forward) -> impl Iterator<Item = &Layer> {
 }
 
 impl Activations {
-    pub fn new(images: usize, folds: &Folds, network: &Forward) -> Activations {
+    /// Room for so many images, a single one shared out to so many threads.
+    pub fn new([images, threads]: [usize; 2], folds: &Folds, network: &Forward) -> Activations {
         let width = folds.width;
         let channels = |level: usize| width << level;
         let half = |level: usize| Map::new(images, panels(channels(level)), side(level + 1));
         let joined = |level: usize| Map::new(images, 2 * panels(channels(level)), side(level));
         Activations {
             images,
-            work: Work::of(layers(network)),
+            threads,
+            works: (0..threads).map(|_| Work::of(layers(network))).collect(),
             input: Map::new(images, 1, side(0)),
             middle: levels(images, DOWN + 1, channels),
             skip: levels(images, DOWN + 1, channels),
@@ -68,6 +73,11 @@ impl Activations {
                 .map(|level| vec![0.0; images * side(level) * side(level)])
                 .collect(),
         }
+    }
+
+    /// Images, and threads for a single one, that there is room for.
+    pub fn size(&self) -> [usize; 2] {
+        [self.images, self.works.len()]
     }
 
     /// From `input` to the features before the last layer, which it returns.
@@ -80,7 +90,7 @@ impl Activations {
         network: &Forward,
         mut saved: Option<&'a mut Saved>,
     ) -> &'a Map {
-        let work = &mut self.work;
+        let works = &mut self.works[..self.threads];
         for level in 0..=DOWN {
             let [first, second] = &network.down[level];
             let x = match level {
@@ -88,13 +98,19 @@ impl Activations {
                 _ => &self.pooled[level - 1],
             };
             let middle = &mut self.middle[level];
-            first.run((target, work), images, all(x), whole(middle), Finish::Relu);
+            first.run(
+                (target, works),
+                images,
+                x.all(),
+                middle.whole(),
+                Finish::Relu,
+            );
             let finish = match self.pooled.get_mut(level) {
-                Some(pooled) => Finish::ReluPool(pooled),
+                Some(pooled) => Finish::ReluPool(pooled.whole()),
                 None => Finish::Relu,
             };
             let skip = &mut self.skip[level];
-            second.run((target, work), images, all(middle), whole(skip), finish);
+            second.run((target, works), images, middle.all(), skip.whole(), finish);
         }
         for level in (0..DOWN).rev() {
             let up = &network.up[level];
@@ -105,32 +121,32 @@ impl Activations {
             }
             let joined = &mut self.joined[level];
             let first = joined.panels / 2;
-            let signal = Sink { map: joined, first };
+            let signal = joined.upper(first);
             up.conv
-                .run((target, work), images, all(below), signal, Finish::Relu);
+                .run((target, works), images, below.all(), signal, Finish::Relu);
             let open = &mut self.open[level];
             let joint = saved
                 .as_deref_mut()
                 .map(|saved| saved.joint[level].as_mut_slice());
             up.gate
-                .run((target, work), images, (skip, joined), open, joint);
+                .run((target, works), images, (skip, joined), open, joint);
             let (middle, result) = match saved.as_deref_mut() {
                 Some(saved) => (&mut saved.middle[level], &mut saved.result[level]),
                 None => (&mut self.middle[level], skip),
             };
             let [first, second] = &up.block;
             first.run(
-                (target, work),
+                (target, works),
                 images,
-                all(joined),
-                whole(middle),
+                joined.all(),
+                middle.whole(),
                 Finish::Relu,
             );
             second.run(
-                (target, work),
+                (target, works),
                 images,
-                all(middle),
-                whole(result),
+                middle.all(),
+                result.whole(),
                 Finish::Relu,
             );
         }
@@ -159,14 +175,4 @@ impl Saved {
                 .collect(),
         }
     }
-}
-
-/// All panels of a map.
-pub fn all(map: &Map) -> Source<'_> {
-    Source { map, first: 0 }
-}
-
-/// All panels of a map.
-pub fn whole(map: &mut Map) -> Sink<'_> {
-    Sink { map, first: 0 }
 }

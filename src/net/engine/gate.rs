@@ -47,26 +47,83 @@ impl Gate {
 
     /// Weights the skip's cells: `joined` holds the signal in its upper half of panels and receives the weighted skip in its lower half.
     ///
-    /// `open` receives every cell's weight, `joint`, if any, its joint features.
+    /// `open` receives every cell's weight, `joint`, if any, its joint features. A single image is shared out to as many threads as there
+    /// are works.
     pub fn run(
         &self,
-        (target, work): (Target, &mut Work),
+        (target, works): (Target, &mut [Work]),
         images: usize,
         (skip, joined): (&Map, &mut Map),
         open: &mut [f32],
+        joint: Option<&mut [Block]>,
+    ) {
+        let works = if images == 1 { works } else { &mut works[..1] };
+        let threads = works.len();
+        let area = skip.side * skip.side;
+        let open = &mut open[..images * area];
+        self.open((target, works), (skip, joined), (0, &mut *open), joint);
+        for (image, open) in open.chunks(area).enumerate() {
+            let lower =
+                joined.index([image, 0], [0, 0])..joined.index([image, self.panels], [0, 0]);
+            let weigh = Weigh {
+                skip,
+                image,
+                first: 0,
+                open,
+                rows: &mut joined.blocks[lower],
+            };
+            weigh.run_on(target, threads);
+        }
+    }
+
+    /// Weights of the cells from `first` on, and their joint features.
+    fn open(
+        &self,
+        (target, works): (Target, &mut [Work]),
+        (skip, joined): (&Map, &Map),
+        (first, open): (usize, &mut [f32]),
+        joint: Option<&mut [Block]>,
+    ) {
+        let (few, others) = works.split_at_mut(works.len() / 2);
+        let half = open.len() / CELLS * few.len() / (few.len() + others.len()) * CELLS;
+        if half > 0 {
+            let (before, after) = open.split_at_mut(half);
+            let (joint_before, joint_after) = match joint {
+                Some(joint) => {
+                    let (before, after) = joint.split_at_mut(half * self.inner);
+                    (Some(before), Some(after))
+                }
+                None => (None, None),
+            };
+            let (maps, next) = ((skip, joined), first + half);
+            rayon::join(
+                || self.open((target, few), maps, (first, before), joint_before),
+                || self.open((target, others), maps, (next, after), joint_after),
+            );
+        } else if let Some(work) = others.first_mut() {
+            self.open_some((target, work), (skip, joined), (first, open), joint);
+        }
+    }
+
+    /// The same on one thread.
+    fn open_some(
+        &self,
+        (target, work): (Target, &mut Work),
+        (skip, joined): (&Map, &Map),
+        (first, open): (usize, &mut [f32]),
         mut joint: Option<&mut [Block]>,
     ) {
         let spans = Spans::new(skip.side);
-        let cells = images * skip.side * skip.side;
-        for first in (0..cells).step_by(CELLS) {
-            let count = CELLS.min(cells - first);
-            for (span, place, image) in spans.of(first..first + count) {
+        for (run, open) in open.chunks_mut(CELLS).enumerate() {
+            let (place, count) = (run * CELLS, open.len());
+            let cells = first + place..first + place + count;
+            for (span, at, image) in spans.of(cells) {
                 for panel in 0..self.panels {
-                    let from = skip.index([image, panel], place);
+                    let from = skip.index([image, panel], at);
                     let to = &mut work.input[panel * CELLS + span..][..spans.length];
                     to.copy_from_slice(&skip.blocks[from..][..spans.length]);
                     let signal = self.panels + panel;
-                    let from = joined.index([image, signal], place);
+                    let from = joined.index([image, signal], at);
                     let to = &mut work.input[signal * CELLS + span..][..spans.length];
                     to.copy_from_slice(&joined.blocks[from..][..spans.length]);
                 }
@@ -82,25 +139,74 @@ impl Gate {
             let mut weights = Block::ZERO;
             target.run(Open {
                 gate: self,
-                cells: &mut work.input,
                 products: &mut work.products,
                 open: &mut weights,
             });
-            open[first..first + count].copy_from_slice(&weights.0[..count]);
+            open.copy_from_slice(&weights.0[..count]);
             if let Some(joint) = joint.as_deref_mut() {
                 for panel in 0..self.inner {
                     for cell in 0..count {
-                        joint[(first + cell) * self.inner + panel] =
+                        joint[(place + cell) * self.inner + panel] =
                             work.products[panel * (CELLS + 1) + cell];
                     }
                 }
             }
-            for (span, place, image) in spans.of(first..first + count) {
-                for panel in 0..self.panels {
-                    let to = joined.index([image, panel], place);
-                    let to = &mut joined.blocks[to..][..spans.length];
-                    to.copy_from_slice(&work.input[panel * CELLS + span..][..spans.length]);
-                }
+        }
+    }
+}
+
+/// Rows of the skip's panels, weighted.
+struct Weigh<'a> {
+    skip: &'a Map,
+    image: usize,
+    /// The first row, counted through the panels with their borders.
+    first: usize,
+    /// All cells' weights of the image.
+    open: &'a [f32],
+    /// The rows to be written, with their borders.
+    rows: &'a mut [Block],
+}
+
+impl Weigh<'_> {
+    fn run_on(self, target: Target, threads: usize) {
+        let stride = self.skip.stride();
+        let half = self.rows.len() / stride * (threads / 2) / threads;
+        if half == 0 {
+            return target.run(self);
+        }
+        let (before, after) = self.rows.split_at_mut(half * stride);
+        let (before, after) = (
+            Weigh {
+                rows: before,
+                ..self
+            },
+            Weigh {
+                rows: after,
+                first: self.first + half,
+                ..self
+            },
+        );
+        rayon::join(
+            || before.run_on(target, threads / 2),
+            || after.run_on(target, threads - threads / 2),
+        );
+    }
+}
+
+impl Kernel for Weigh<'_> {
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) {
+        let (stride, side) = (self.skip.stride(), self.skip.side);
+        let rows = (self.first..).zip(self.rows.chunks_exact_mut(stride));
+        for (row, to) in rows {
+            let (panel, row) = (row / stride, row % stride);
+            if row == 0 || row > side {
+                continue;
+            }
+            let from = self.skip.row([self.image, panel], row - 1);
+            let open = &self.open[(row - 1) * side..][..side];
+            for ((to, from), open) in to[1..].iter_mut().zip(from).zip(open) {
+                s.store(s.mul(s.load(from), s.splat(*open)), to);
             }
         }
     }
@@ -131,11 +237,9 @@ impl Spans {
     }
 }
 
-/// Joint features (in place of the products) and weights of sixteen cells, and the skip's cells weighted in place.
+/// Joint features (in place of the products) and weights of sixteen cells.
 struct Open<'a> {
     gate: &'a Gate,
-    /// `[panel][cell]`.
-    cells: &'a mut [Block],
     products: &'a mut [Block],
     open: &'a mut Block,
 }
@@ -158,12 +262,6 @@ impl Kernel for Open<'_> {
         }
         for x in &mut self.open.0 {
             *x = 1.0 / (1.0 + exp(-x.clamp(-80.0, 80.0)));
-        }
-        let cells = self.cells.chunks_mut(CELLS).take(self.gate.panels);
-        for cells in cells {
-            for (cell, open) in cells.iter_mut().zip(self.open.0) {
-                s.store(s.mul(s.load(cell), s.splat(open)), cell);
-            }
         }
     }
 }

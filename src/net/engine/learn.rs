@@ -41,9 +41,9 @@ impl Lane {
     fn new(engine: &Engine) -> Lane {
         let folds = &engine.folds;
         Lane {
-            forward: Activations::new(TOGETHER, folds, engine.forward()),
+            forward: Activations::new([TOGETHER, 1], folds, engine.forward()),
             saved: Saved::new(TOGETHER, folds, engine.forward()),
-            backward: Gradients::new(TOGETHER, folds, engine.reverse()),
+            backward: Gradients::new([TOGETHER, 1], folds, engine.reverse()),
             sums: WeightSums::new(TOGETHER, folds),
             room: Room::default(),
         }
@@ -53,13 +53,13 @@ impl Lane {
         let images = input.images();
         show(
             engine,
-            &mut self.room,
+            (&mut self.room, false),
             input,
             (out, &mut self.forward.input),
         );
         let (forward, saved) = (&mut self.forward, &mut self.saved);
         let features = forward.run(engine.target, images, engine.forward(), Some(saved));
-        (0..images).for_each(|image| say(engine, (features, image), out));
+        say((engine, 1), features, out);
     }
 
     fn differentiate(&mut self, engine: &Engine, cotangents: &[f32]) {

@@ -42,6 +42,32 @@ impl Map {
         ((image * self.panels + panel) * stride + row) * stride + column
     }
 
+    /// All panels, to be read.
+    pub fn all(&self) -> Source<'_> {
+        self.from(0)
+    }
+
+    /// The panels from `first` on, to be read.
+    pub fn from(&self, first: usize) -> Source<'_> {
+        Source { map: self, first }
+    }
+
+    /// All panels, to be written.
+    pub fn whole(&mut self) -> Sink<'_> {
+        self.upper(0)
+    }
+
+    /// The panels from `first` on, to be written.
+    pub fn upper(&mut self, first: usize) -> Sink<'_> {
+        Sink {
+            panels: self.panels,
+            stride: self.stride(),
+            blocks: &mut self.blocks,
+            begin: 0,
+            first,
+        }
+    }
+
     /// One row of cells without its border.
     #[inline(always)]
     pub fn row(&self, plane: [usize; 2], row: usize) -> &[Block] {
@@ -55,5 +81,43 @@ impl Map {
         let start = self.index(plane, [row + 1, 1]);
         let side = self.side;
         &mut self.blocks[start..start + side]
+    }
+}
+
+/// The panels of a map from `first` on.
+#[derive(Clone, Copy)]
+pub struct Source<'a> {
+    pub map: &'a Map,
+    pub first: usize,
+}
+
+/// The panels of a map from `first` on, or a stretch of them: parts of one map can be written by several threads.
+pub struct Sink<'a> {
+    panels: usize,
+    pub stride: usize,
+    /// The map's blocks from `begin` on.
+    pub blocks: &'a mut [Block],
+    begin: usize,
+    first: usize,
+}
+
+impl<'a> Sink<'a> {
+    /// Index in `blocks` of a cell of the panel so many after the first; as [`Map::index`].
+    #[inline(always)]
+    pub fn index(&self, [image, panel]: [usize; 2], [row, column]: [usize; 2]) -> usize {
+        let plane = image * self.panels + self.first + panel;
+        (plane * self.stride + row) * self.stride + column - self.begin
+    }
+
+    /// What lies before a row of a panel of the first image, and the rest.
+    pub fn split(self, panel: usize, row: usize) -> (Sink<'a>, Sink<'a>) {
+        let at = self.index([0, panel], [row, 0]);
+        let (before, after) = self.blocks.split_at_mut(at);
+        let part = |blocks, begin| Sink {
+            blocks,
+            begin,
+            ..self
+        };
+        (part(before, self.begin), part(after, self.begin + at))
     }
 }

@@ -72,7 +72,7 @@ pub enum EngineError {
 pub struct Options {
     /// The instruction set; the CPU's best where there is none.
     pub isa: Option<Isa>,
-    /// Threads that share a call's grids; one grid is one thread's.
+    /// Threads that share a call's grids, and the layers of each where there are fewer grids than threads.
     pub threads: usize,
 }
 

@@ -35,6 +35,15 @@ impl Plan {
         }
     }
 
+    /// Cells of output along a tile's side; that many rows of it are a row of tiles.
+    pub fn cells(self) -> usize {
+        match self {
+            Plan::Four => 4,
+            Plan::Two | Plan::Up => 2,
+            Plan::Down => 1,
+        }
+    }
+
     /// Products for one tile.
     pub fn frequencies(self) -> usize {
         match self {

@@ -43,17 +43,17 @@ pub struct Room {
 
 impl Scratch {
     pub(super) fn predict(&mut self, engine: &Engine, input: Input, out: &mut [f32]) {
-        let share = self.share(engine, input.images());
+        let (share, threads) = self.share(engine, input.images());
         let work = |lane: &mut Lane, first: usize, out: &mut [f32]| {
             let numbered = (first..).step_by(TOGETHER);
             for (first, out) in numbered.zip(out.chunks_mut(TOGETHER * 3 * CELLS)) {
                 let images = first..first + out.len() / (3 * CELLS);
-                lane.predict(engine, input.part(images), out);
+                lane.predict((engine, threads), input.part(images), out);
             }
         };
         if share >= input.images() {
             if let Some(lane) = self.lanes.first_mut() {
-                work(lane, 0, out);
+                on_pool(threads, || work(lane, 0, out));
             }
             return;
         }
@@ -70,7 +70,7 @@ impl Scratch {
         cotangent: &Cotangent,
         out: Gradient,
     ) {
-        let share = self.share(engine, input.images());
+        let (share, threads) = self.share(engine, input.images());
         let work = |lane: &mut Lane, first: usize, out: Gradient| {
             let outs = (out.prediction.chunks_mut(TOGETHER * 3 * CELLS))
                 .zip(out.by_positions.chunks_mut(TOGETHER * 3 * CELLS))
@@ -83,12 +83,17 @@ impl Scratch {
                     by_positions,
                     by_known,
                 };
-                lane.gradient(engine, input.part(images), (first, cotangent), out);
+                lane.gradient(
+                    (engine, threads),
+                    input.part(images),
+                    (first, cotangent),
+                    out,
+                );
             }
         };
         if share >= input.images() {
             if let Some(lane) = self.lanes.first_mut() {
-                work(lane, 0, out);
+                on_pool(threads, || work(lane, 0, out));
             }
             return;
         }
@@ -108,54 +113,64 @@ impl Scratch {
             });
     }
 
-    /// Grids a thread takes; makes sure that there are lanes for all.
-    fn share(&mut self, engine: &Engine, images: usize) -> usize {
+    /// Grids a lane takes, and threads that share one out where it takes one; makes sure that there are lanes for all.
+    fn share(&mut self, engine: &Engine, images: usize) -> (usize, usize) {
         let share = images.div_ceil(engine.threads).max(1);
         let lanes = images.div_ceil(share).max(1);
         if self.lanes.len() < lanes {
             self.lanes.resize_with(lanes, Lane::default);
         }
-        share
+        (share, (engine.threads / lanes).max(1))
+    }
+}
+
+/// Runs on a thread of the pool where the work will be shared out: from outside it every sharing would cost a waking.
+fn on_pool(threads: usize, work: impl FnOnce() + Send) {
+    match threads {
+        0 | 1 => work(),
+        _ => rayon::scope(|_| work()),
     }
 }
 
 impl Lane {
     /// Predicts at most [`TOGETHER`] grids.
-    fn predict(&mut self, engine: &Engine, input: Input, all: &mut [f32]) {
+    fn predict(&mut self, (engine, threads): (&Engine, usize), input: Input, all: &mut [f32]) {
         let images = input.images();
         let (target, network) = (engine.target, engine.forward());
-        let room = Lane::room(&mut self.forward, engine, images);
-        show(engine, &mut self.fill, input, (all, &mut room.input));
+        let room = Lane::room(&mut self.forward, engine, [images, threads]);
+        let fill = (&mut self.fill, false);
+        show(engine, fill, input, (all, &mut room.input));
         let features = room.run(target, images, network, None);
-        (0..images).for_each(|image| say(engine, (features, image), all));
+        say((engine, threads), features, all);
     }
 
     /// Predicts and differentiates at most [`TOGETHER`] grids.
     fn gradient(
         &mut self,
-        engine: &Engine,
+        (engine, threads): (&Engine, usize),
         input: Input,
         (first, cotangent): (usize, &Cotangent),
         out: Gradient,
     ) {
         let images = input.images();
         let (target, network, reverse) = (engine.target, engine.forward(), engine.reverse());
-        let room = Lane::room(&mut self.forward, engine, images);
-        let fits = |(_, gradients): &(Saved, Gradients)| gradients.images() >= images;
-        if !self.backward.as_ref().is_some_and(fits) {
-            let saved = Saved::new(images, &engine.folds, network);
-            self.backward = Some((saved, Gradients::new(images, &engine.folds, reverse)));
-            self.planes.resize(3 * CELLS, 0.0);
-            self.cotangents.resize(images * 3 * CELLS, 0.0);
-        }
-        let Some((saved, gradients)) = &mut self.backward else {
-            return;
-        };
+        let room = Lane::room(&mut self.forward, engine, [images, threads]);
+        let old = self
+            .backward
+            .as_ref()
+            .map(|(_, gradients)| gradients.size());
+        let (saved, gradients) = place(&mut self.backward, old, [images, threads], |size| {
+            let saved = Saved::new(size[0], &engine.folds, network);
+            (saved, Gradients::new(size, &engine.folds, reverse))
+        });
+        gradients.threads = threads;
+        self.planes.resize(3 * CELLS, 0.0);
+        self.cotangents.resize(images * 3 * CELLS, 0.0);
         let shown = (&mut *out.prediction, &mut room.input);
-        show(engine, &mut self.fill, input, shown);
+        show(engine, (&mut self.fill, true), input, shown);
         let features = room.run(target, images, network, Some(saved));
+        say((engine, threads), features, out.prediction);
         for image in 0..images {
-            say(engine, (features, image), out.prediction);
             let by_prediction = image3_mut(&mut self.cotangents, image);
             cotangent(first + image, image3(out.prediction, image), by_prediction);
             target.run(LastAdjoint {
@@ -194,17 +209,33 @@ impl Lane {
         }
     }
 
-    /// Room for a forward pass of so many grids.
+    /// Room for a forward pass of so many grids, a single one shared out to so many threads.
     fn room<'a>(
         room: &'a mut Option<Activations>,
         engine: &Engine,
-        images: usize,
+        size: [usize; 2],
     ) -> &'a mut Activations {
-        let old = room.take().filter(|room| room.images >= images);
-        room.insert(
-            old.unwrap_or_else(|| Activations::new(images, &engine.folds, engine.forward())),
-        )
+        let old = room.as_ref().map(Activations::size);
+        let made = place(room, old, size, |size| {
+            Activations::new(size, &engine.folds, engine.forward())
+        });
+        made.threads = size[1];
+        made
     }
+}
+
+/// What is in a place, made anew where its size is too small; it never shrinks.
+fn place<T>(
+    place: &mut Option<T>,
+    old: Option<[usize; 2]>,
+    size: [usize; 2],
+    make: impl FnOnce([usize; 2]) -> T,
+) -> &mut T {
+    let old = old.unwrap_or_default();
+    if old[0] < size[0] || old[1] < size[1] {
+        *place = None;
+    }
+    place.get_or_insert_with(|| make([old[0].max(size[0]), old[1].max(size[1])]))
 }
 
 pub fn image3(planes: &[f32], image: usize) -> &[f32] {
@@ -215,32 +246,55 @@ fn image3_mut(planes: &mut [f32], image: usize) -> &mut [f32] {
     &mut planes[image * 3 * CELLS..][..3 * CELLS]
 }
 
-/// Lays out what the network sees of some grids; in `filled`, as planes, what its answer is added to.
-pub fn show(engine: &Engine, fill: &mut Room, input: Input, (filled, map): (&mut [f32], &mut Map)) {
+/// Lays out what the network sees of some grids; in `filled`, as planes, what its answer is added to. `again` when the fill's adjoint will
+/// be asked for.
+pub fn show(
+    engine: &Engine,
+    (fill, again): (&mut Room, bool),
+    input: Input,
+    (filled, map): (&mut [f32], &mut Map),
+) {
     for image in 0..input.images() {
         let grid = input.part(image..image + 1);
         let filled = image3_mut(filled, image);
-        enter(engine, fill, grid, filled);
+        enter(engine, (fill, again), grid, filled);
         lay_out((filled, grid), image, map);
     }
 }
 
-/// The last layer's answer for one of the grids, added to what [`show`] left in `all`, or put in its place.
-pub fn say(engine: &Engine, (features, image): (&Map, usize), all: &mut [f32]) {
-    engine.target.run(Last {
-        engine,
-        features,
-        image,
-        out: image3_mut(all, image),
-    });
+/// The last layer's answer for all grids, added to what [`show`] left in `all`, or put in its place.
+pub fn say((engine, threads): (&Engine, usize), features: &Map, all: &mut [f32]) {
+    let each = |(plane, out)| {
+        engine.target.run(Last {
+            engine,
+            features,
+            plane,
+            out,
+        });
+    };
+    match threads {
+        1 => all.chunks_mut(CELLS).enumerate().for_each(each),
+        _ => all.par_chunks_mut(CELLS).enumerate().for_each(each),
+    }
 }
 
 /// One grid's positions as the network sees them, but for their scale.
-fn enter(engine: &Engine, Room { pyramid, off }: &mut Room, grid: Input, filled: &mut [f32]) {
+fn enter(
+    engine: &Engine,
+    (Room { pyramid, off }, again): (&mut Room, bool),
+    grid: Input,
+    filled: &mut [f32],
+) {
     match engine.config.input {
         InputKind::Membrane | InputKind::Plate => {
-            let x = (off_base(grid, off), grid.known);
-            membrane(engine.target, pyramid, x, filled);
+            let off = off_base(grid, off);
+            let none = |(k, x): (usize, &f32)| x * grid.known[k % CELLS] == 0.0;
+            if !again && off.iter().enumerate().all(none) {
+                // Without anchors a base goes through all that is known, and the membrane over it is zero.
+                filled.fill(0.0);
+            } else {
+                membrane(engine.target, pyramid, (off, grid.known), filled);
+            }
             for (to, base) in filled.iter_mut().zip(grid.base.unwrap_or_default()) {
                 *to += base;
             }
@@ -291,11 +345,12 @@ fn take_out(input: &Map, image: usize, (by_filled, by_known): (&mut [f32], &mut 
     }
 }
 
-/// The last layer: features to positions, added to the membrane in `out` or put in its place.
+/// The last layer: features to one axis of one grid's positions, added to the membrane in `out` or put in its place.
 struct Last<'a> {
     engine: &'a Engine,
     features: &'a Map,
-    image: usize,
+    /// Three times the grid, and the axis.
+    plane: usize,
     out: &'a mut [f32],
 }
 
@@ -303,26 +358,23 @@ impl Kernel for Last<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let folds = &self.engine.folds;
-        for axis in 0..3 {
-            let weights = &folds.last[axis * folds.width..][..folds.width];
-            for row in 0..SIDE {
-                let out = &mut self.out[axis * CELLS + row * SIDE..][..SIDE];
-                for (column, out) in out.iter_mut().enumerate() {
-                    let mut sum = s.splat(0.0);
-                    for (panel, weights) in weights.chunks(LANES).enumerate() {
-                        let place = [self.image, panel];
-                        let place = self.features.index(place, [row + 1, column + 1]);
-                        let x = s.load(&self.features.blocks[place]);
-                        sum = s.mul_add(x, s.load(&padded(weights)), sum);
-                    }
-                    let mut block = Block::ZERO;
-                    s.store(sum, &mut block);
-                    let x = (block.sum() + folds.last_bias[axis]) * OUTPUT_SCALE;
-                    *out = match self.engine.config.input {
-                        InputKind::Membrane | InputKind::Plate => *out + x,
-                        InputKind::Zeros => x,
-                    };
+        let (image, axis) = (self.plane / 3, self.plane % 3);
+        let weights = &folds.last[axis * folds.width..][..folds.width];
+        for (row, out) in self.out.chunks_mut(SIDE).enumerate() {
+            for (column, out) in out.iter_mut().enumerate() {
+                let mut sum = s.splat(0.0);
+                for (panel, weights) in weights.chunks(LANES).enumerate() {
+                    let place = self.features.index([image, panel], [row + 1, column + 1]);
+                    let x = s.load(&self.features.blocks[place]);
+                    sum = s.mul_add(x, s.load(&padded(weights)), sum);
                 }
+                let mut block = Block::ZERO;
+                s.store(sum, &mut block);
+                let x = (block.sum() + folds.last_bias[axis]) * OUTPUT_SCALE;
+                *out = match self.engine.config.input {
+                    InputKind::Membrane | InputKind::Plate => *out + x,
+                    InputKind::Zeros => x,
+                };
             }
         }
     }

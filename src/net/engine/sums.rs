@@ -1,7 +1,6 @@
 //! Gradients with respect to the weights, as sums over cells: what a weight saw times what its result should change by.
 
-use super::convolve::Source;
-use super::map::{Map, panels};
+use super::map::{Map, Source, panels};
 use super::network::{DOWN, Folds, GateFolds, UpFolds, side};
 use super::pack::{Folded, Parts};
 use super::simd::{Block, Kernel, LANES, Simd, Target};

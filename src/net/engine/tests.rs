@@ -356,6 +356,13 @@ fn company_and_threads_change_nothing() {
             let plain = predict(&engine, &mut scratch, (&positions, &known));
             assert!(plain == each[0], "{} {threads}", isa.name());
         }
+        for threads in [2, 3, 7] {
+            let engine = engine(&tensors, config, isa, threads);
+            let grid = (&positions[..3 * CELLS], &known[..CELLS]);
+            let shared = gradient(&engine, &mut scratch, grid, &cotangent[..3 * CELLS]);
+            let same = shared.iter().zip(&each).all(|(a, b)| *a == b[..a.len()]);
+            assert!(same, "{} {threads}: one grid", isa.name());
+        }
     }
 }
 
