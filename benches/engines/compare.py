@@ -11,6 +11,7 @@ import numpy as np
 import onnxruntime
 import openvino
 
+import pytorch
 from export import export
 
 
@@ -47,6 +48,20 @@ ENGINES = {
     "onnxruntime f32": onnxruntime_engine,
     "openvino f32": openvino_engine("f32"),
     "openvino bf16": openvino_engine("bf16"),
+}
+
+
+def pytorch_engine(call):
+    def build(weights, threads):
+        return call(pytorch.Network(weights), threads)
+
+    return build
+
+
+# Built from the weights file, not from the ONNX model.
+PYTORCH = {
+    "pytorch f32": pytorch_engine(pytorch.forward),
+    "pytorch f32 gradient": pytorch_engine(pytorch.gradient),
 }
 
 
@@ -88,9 +103,13 @@ def main():
                 run = build(model, threads)
                 runs[name, batch, threads] = (lambda run=run, x=x: run(x))
                 outputs[name, batch] = np.array(run(x))
+            for name, build in PYTORCH.items():
+                run = build(arguments.weights, threads)
+                runs[name, batch, threads] = (lambda run=run, x=x: run(x))
+            outputs["pytorch f32", batch] = runs["pytorch f32", batch, threads]()
     for batch in (1, 8):
         truth = outputs["onnxruntime f32", batch]
-        for name in ENGINES:
+        for name in [*ENGINES, "pytorch f32"]:
             error = np.abs(outputs[name, batch] - truth).max()
             print(f"# batch {batch}: {name} to onnxruntime {error:.1e}, largest output {np.abs(truth).max():.1e}")
 

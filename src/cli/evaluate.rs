@@ -5,7 +5,7 @@ use super::files;
 use super::mended::mended;
 use super::network::NetworkArgs;
 use super::progress::Progress;
-use darn::evaluate::{self, Cut, EvaluateError, Plan, Report, ScanRow, Shares};
+use darn::evaluate::{self, Cut, EvaluateError, Plan, Report, ScanRow, Scanner, Shares};
 use darn::grid::NormalGrid;
 use darn::net::Averaging;
 use darn::patch::Options;
@@ -42,6 +42,9 @@ pub struct Args {
     /// Mend this many sheets end to end, too, each scanned with a round, a ragged and a long hole
     #[arg(long, value_name = "N", default_value_t = 0)]
     scans: usize,
+    /// Noise of the scans' vertices: standard deviation of every coordinate, in edges
+    #[arg(long, value_name = "SIGMA", default_value_t = 0.0, value_parser = noise, requires = "scans")]
+    scan_noise: f64,
     /// Compare the holes of training samples with those of flattened scans instead
     #[arg(long, conflicts_with_all = ["noise", "picture", "upright", "scans"])]
     masks: bool,
@@ -87,10 +90,14 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     drop(progress);
     let report = report.or_fail("evaluate")?;
     print!("{}", report.markdown());
+    let scanner = Scanner {
+        seed: args.seed,
+        noise: args.scan_noise,
+    };
     let scans: Vec<Option<ScanRow>> = (Cut::ALL.into_iter())
         .flat_map(|cut| {
             let sheets = &sheets[..args.scans.min(sheets.len())];
-            evaluate::over_scans(sheets, cut, args.seed, &|scan| mended(scan, &mender))
+            evaluate::over_scans(sheets, cut, &scanner, &|scan| mended(scan, &mender))
         })
         .collect();
     if !scans.is_empty() {
@@ -186,7 +193,7 @@ fn quantiles(mut numbers: Vec<f64>) -> String {
 fn noise(text: &str) -> Result<f64, String> {
     match text.trim().parse() {
         Ok(sigma) if (0.0..=2.0).contains(&sigma) => Ok(sigma),
-        _ => Err(format!("{text:?} is not a number of cells from 0 to 2")),
+        _ => Err(format!("{text:?} is not a number from 0 to 2")),
     }
 }
 

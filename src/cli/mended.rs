@@ -30,7 +30,13 @@ fn through_glb(
         faces: &scanned.mesh.faces,
     })?;
     let scan = Scan::read(&bytes, &Limits::default())?;
-    let mended = mend::mend(&scan, &Constraints::default(), mender)?;
+    // Sheets hang along −z.
+    let architecture = mender.networks.default().card().architecture;
+    let constraints = Constraints {
+        up: (architecture.frame.knows_up()).then_some([0.0, 0.0, 1.0]),
+        ..Constraints::default()
+    };
+    let mended = mend::mend(&scan, &constraints, mender)?;
     let scan = Scan::read(&mended.bytes, &Limits::default())?;
     Ok(weld::weld(&scan.surface).mesh)
 }

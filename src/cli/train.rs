@@ -47,12 +47,27 @@ pub struct Args {
     /// What the network sees in unknown cells
     #[arg(long, value_enum, default_value = "plate")]
     input: Input,
-    /// Keep up up: the network is told where it is, and is for scans that say so
+    /// Keep up up instead of turning every sample anyhow: for scans that say where up is
     #[arg(long)]
     upright: bool,
+    /// The frame the network sees the cloth in; left out, canonical, or hanging with --upright
+    #[arg(long, value_enum)]
+    frame: Option<Frame>,
+    /// Leave the attention gates open for good: what they are worth
+    #[arg(long)]
+    open_gates: bool,
     /// What counts as an error
     #[arg(long, value_enum, default_value = "standard")]
     loss: Loss,
+    /// Weight of the differences between neighbours, instead of the loss's own
+    #[arg(long, value_name = "WEIGHT", value_parser = weight)]
+    alpha: Option<f64>,
+    /// Weight of the repulsion of cloth from cloth, instead of the loss's own
+    #[arg(long, value_name = "WEIGHT", value_parser = weight)]
+    beta: Option<f64>,
+    /// Weight of the lengths between neighbours, instead of the loss's own
+    #[arg(long, value_name = "WEIGHT", value_parser = weight)]
+    gamma: Option<f64>,
     /// What computes the steps: burn, or the engine, which is several times as fast but needs weights to start from
     #[arg(long, default_value = "burn")]
     trainer: Trainer,
@@ -87,6 +102,27 @@ impl Input {
             Self::Zeros => InputKind::Zeros,
             Self::Membrane => InputKind::Membrane,
             Self::Plate => InputKind::Plate,
+        }
+    }
+}
+
+/// The frames that a network can see cloth in.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Frame {
+    /// As the cloth lies (the paper)
+    Given,
+    /// Turned onto its chart
+    Canonical,
+    /// Turned onto its chart, and told where up is
+    Hanging,
+}
+
+impl Frame {
+    fn kind(self) -> FrameKind {
+        match self {
+            Self::Given => FrameKind::Given,
+            Self::Canonical => FrameKind::Canonical,
+            Self::Hanging => FrameKind::Hanging,
         }
     }
 }
@@ -129,6 +165,16 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 }
 
 impl Args {
+    fn weights(&self) -> LossWeights {
+        let named = self.loss.weights();
+        LossWeights {
+            gradient: self.alpha.unwrap_or(named.gradient),
+            self_penetration: self.beta.unwrap_or(named.self_penetration),
+            stretch: self.gamma.unwrap_or(named.stretch),
+            ..named
+        }
+    }
+
     fn options(&self) -> TrainOptions {
         TrainOptions {
             name: self.name.clone(),
@@ -145,13 +191,15 @@ impl Args {
             network: UnetConfig {
                 width: self.width,
                 input: self.input.kind(),
-                frame: if self.upright {
-                    FrameKind::Hanging
-                } else {
-                    FrameKind::Canonical
+                frame: match (self.frame, self.upright) {
+                    (Some(frame), _) => frame.kind(),
+                    (None, true) => FrameKind::Hanging,
+                    (None, false) => FrameKind::Canonical,
                 },
             },
-            loss: self.loss.weights(),
+            upright: self.upright,
+            open_gates: self.open_gates,
+            loss: self.weights(),
             batch: self.batch,
             roughest_of: self.roughest_of,
             rate: self.rate,
@@ -223,6 +271,13 @@ impl Drop for Told {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
+    }
+}
+
+fn weight(text: &str) -> Result<f64, String> {
+    match text.trim().parse() {
+        Ok(weight) if (0.0..=1e6).contains(&weight) => Ok(weight),
+        _ => Err(format!("{text:?} is not a weight from 0 to 1000000")),
     }
 }
 

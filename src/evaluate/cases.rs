@@ -114,7 +114,7 @@ impl Case {
 }
 
 /// A standard normal number (Box–Muller).
-fn gaussian(rng: &mut ChaCha8Rng) -> f64 {
+pub(super) fn gaussian(rng: &mut ChaCha8Rng) -> f64 {
     let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
     radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
 }

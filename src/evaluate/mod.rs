@@ -20,7 +20,7 @@ pub use measure::{Measured, Measures, measure};
 pub use patched::patched;
 pub use picture::picture;
 pub use report::{Fill, Report, Row, Stage};
-pub use scans::{Mend, ScanRow, over_scans, scan_table};
+pub use scans::{Mend, ScanRow, Scanner, over_scans, scan_table};
 pub use sweep::{Plan, run};
 
 use crate::grid::NormalGrid;

@@ -9,6 +9,7 @@ use rstar::primitives::GeomWithData;
 use serde::Serialize;
 
 use super::EvaluateError;
+use super::cases::gaussian;
 use super::masks::{Cut, SCANNED};
 use crate::mesh::curvature::{angle_defect, face_areas, vertex_normals};
 use crate::mesh::intersect::intersections_with;
@@ -44,13 +45,35 @@ pub struct ScanRow {
 /// Mends a scan; the answer has the scan's vertices at their places (as f32), and the new cloth.
 pub type Mend<'a> = &'a dyn Fn(&Scanned) -> Result<TriMesh, EvaluateError>;
 
+/// How sheets are scanned.
+#[derive(Debug, Clone, Copy)]
+pub struct Scanner {
+    /// Seed of holes, meshes and noise.
+    pub seed: u64,
+    /// Standard deviation of the noise on every coordinate of a vertex, in edges of the scan.
+    pub noise: f64,
+}
+
 /// Scans every sheet with a hole of the given kind, has it mended and measures it; `None` where nothing was mended.
-pub fn over_scans(sheets: &[Sheet], cut: Cut, seed: u64, mend: Mend) -> Vec<Option<ScanRow>> {
+pub fn over_scans(
+    sheets: &[Sheet],
+    cut: Cut,
+    scanner: &Scanner,
+    mend: Mend,
+) -> Vec<Option<ScanRow>> {
     let one = |(number, sheet): (usize, &Sheet)| {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut rng = ChaCha8Rng::seed_from_u64(scanner.seed);
         rng.set_stream(number as u64);
         let hole = cut.drawn(&mut rng);
-        let scan = scanned(sheet, SCANNED, &hole, &mut rng);
+        let mut scan = scanned(sheet, SCANNED, &hole, &mut rng);
+        if scanner.noise > 0.0 {
+            let sigma = scanner.noise / SCANNED as f64;
+            // Of its own, so that the holes are those without noise.
+            let mut rng = rng.clone();
+            for p in &mut scan.mesh.positions {
+                *p += Vec3::from_fn(|_, _| gaussian(&mut rng)) * sigma;
+            }
+        }
         let mended = mend(&scan).ok()?;
         judged(&scan, &mended, &mut rng).map(|row| ScanRow {
             sheet: number,
@@ -208,15 +231,18 @@ pub fn scan_table(rows: &[Option<ScanRow>]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::Vec2;
 
-    /// A sheet bent once, isometric to the plane.
+    /// Where a point of the unit square is on a sheet bent once, isometric to the plane.
+    fn surface(p: Vec2) -> Vec3 {
+        Vec3::new(0.5 * (p.x / 0.5).sin(), p.y, 0.5 * (p.x / 0.5).cos())
+    }
+
+    /// The sheet.
     fn bent() -> Sheet {
-        let positions = (0..51 * 51).map(|k| {
-            let (u, v) = ((k % 51) as f32 / 50.0, (k / 51) as f32 / 50.0);
-            [0.5 * (u / 0.5).sin(), v, 0.5 * (u / 0.5).cos()]
-        });
+        let rest = (0..51 * 51).map(|k| Vec2::new((k % 51) as f64, (k / 51) as f64) / 50.0);
         Sheet {
-            positions: positions.collect(),
+            positions: rest.map(|p| surface(p).cast().into()).collect(),
         }
     }
 
@@ -237,8 +263,12 @@ mod tests {
 
     #[test]
     fn what_was_cut_out_is_the_best_patch() {
+        let clean = Scanner {
+            seed: 3,
+            noise: 0.0,
+        };
         let perfect = |scan: &Scanned| Ok(whole(scan, 0.0));
-        let rows = over_scans(&[bent()], Cut::Circle, 3, &perfect);
+        let rows = over_scans(&[bent()], Cut::Circle, &clean, &perfect);
         let row = rows[0].unwrap();
         // Points drawn twice from one surface are not at the same places: the floor of the measure.
         assert!(
@@ -248,18 +278,36 @@ mod tests {
         assert!((row.area - 1.0).abs() < 1e-9 && row.self_intersections == 0);
         assert!(row.curvature < 0.01);
         let shifted = |scan: &Scanned| Ok(whole(scan, 0.05));
-        let worse = over_scans(&[bent()], Cut::Circle, 3, &shifted)[0].unwrap();
+        let worse = over_scans(&[bent()], Cut::Circle, &clean, &shifted)[0].unwrap();
         assert!(worse.h95 > 2.0 * row.h95);
         assert!(scan_table(&rows).contains("| circle | 1 |"));
+
+        let noisy = Scanner {
+            noise: 0.3,
+            ..clean
+        };
+        let blurred = over_scans(&[bent()], Cut::Circle, &noisy, &|scan| {
+            let off = |(p, q): (&Vec3, &Vec2)| (p - surface(*q)).norm_squared();
+            let pairs = scan.mesh.positions.iter().zip(&scan.rest);
+            let mean = pairs.map(off).sum::<f64>() / scan.rest.len() as f64;
+            assert!((mean.sqrt() * SCANNED as f64 / 0.3 / 3.0f64.sqrt() - 1.0).abs() < 0.05);
+            Ok(whole(scan, 0.0))
+        });
+        let same_area = blurred[0].unwrap().area;
+        assert!((same_area - 1.0).abs() < 1e-9, "what is lost has no noise");
     }
 
     #[test]
     fn a_scan_that_is_not_mended_has_no_row() {
+        let clean = Scanner {
+            seed: 3,
+            noise: 0.0,
+        };
         let idle = |scan: &Scanned| Ok(scan.mesh.clone());
         let failing = |_: &Scanned| Err(EvaluateError::Nothing("no"));
         let rows: Vec<_> = [&idle as Mend, &failing]
             .iter()
-            .flat_map(|mend| over_scans(&[bent()], Cut::Slit, 3, *mend))
+            .flat_map(|mend| over_scans(&[bent()], Cut::Slit, &clean, *mend))
             .collect();
         assert_eq!(rows, [None, None]);
         assert!(scan_table(&rows).ends_with("|---|\n"));

@@ -88,6 +88,12 @@ pub struct TrainOptions {
     pub trainer: Trainer,
     /// The network.
     pub network: UnetConfig,
+    /// Whether sheets stay upright, or are turned anyhow.
+    #[serde(default)]
+    pub upright: bool,
+    /// Whether a fresh network's attention gates are open for good, as if there were none.
+    #[serde(default)]
+    pub open_gates: bool,
     /// Weights of the loss's terms.
     pub loss: LossWeights,
     /// Samples a step.
@@ -131,6 +137,8 @@ impl Default for TrainOptions {
             from: None,
             trainer: Trainer::Burn,
             network: UnetConfig::default(),
+            upright: false,
+            open_gates: false,
             loss: LossWeights::default(),
             batch: 16,
             roughest_of: 1,
@@ -151,8 +159,7 @@ pub fn run(
     options: &TrainOptions,
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Summary, TrainError> {
-    // In the canonical frame the turning is undone anyway.
-    let turning = match options.network.frame.knows_up() {
+    let turning = match options.upright {
         true => Turning::Upright,
         false => Turning::Any,
     };

@@ -12,6 +12,9 @@ use super::loss::Loss;
 use super::{TrainError, TrainOptions};
 use crate::net::weights::{self, NamedTensors, export};
 
+/// A score whose sigmoid is 1 in f32, with no slope.
+const WIDE: f32 = 80.0;
+
 /// What computes the steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -89,7 +92,7 @@ impl Snapshot {
     /// # Errors
     /// A file that cannot be read, or holds another architecture.
     pub fn fresh(options: &TrainOptions) -> Result<Snapshot, TrainError> {
-        let network = match &options.from {
+        let mut network = match &options.from {
             None => {
                 let device = Default::default();
                 Flex::seed(&device, options.seed);
@@ -97,6 +100,9 @@ impl Snapshot {
             }
             Some(_) => given(options)?,
         };
+        if options.open_gates {
+            open_gates(&mut network);
+        }
         Ok(Snapshot {
             averaged: network.clone(),
             network,
@@ -132,6 +138,17 @@ fn given(options: &TrainOptions) -> Result<NamedTensors, TrainError> {
         last.for_each(|(_, (_, values))| values.fill(0.0));
     }
     Ok(tensors)
+}
+
+/// Opens all gates so wide that they let everything through and learn nothing.
+fn open_gates(tensors: &mut NamedTensors) {
+    for (name, (_, values)) in tensors {
+        if name.ends_with(".gate.score.weight") {
+            values.fill(0.0);
+        } else if name.ends_with(".gate.score.bias") {
+            values.fill(WIDE);
+        }
+    }
 }
 
 /// Lets a network see another number of channels: further ones mean nothing to it at first, the last ones are lost.
