@@ -77,12 +77,26 @@ pub struct Unedited {
 }
 
 impl Prepared {
-    /// Prepares a hole; with smaller and smaller regions when one gives no usable chart.
+    /// Prepares a hole; with smaller and smaller regions when one gives no usable chart, and at last with the scanner's noise.
     pub fn new(cloth: &Cloth, id: u32, limits: &Limits) -> Result<Prepared, MendError> {
+        match Self::seen_by(Some(&Filter::default()), cloth, id, limits) {
+            Err(error) if may_shrink(&error) => {
+                Self::seen_by(None, cloth, id, limits).map_err(|_| error)
+            }
+            outcome => outcome,
+        }
+    }
+
+    fn seen_by(
+        filter: Option<&Filter>,
+        cloth: &Cloth,
+        id: u32,
+        limits: &Limits,
+    ) -> Result<Prepared, MendError> {
         let mut reach = reach_for(extent_at_a_glance(cloth, id));
         let mut tries = 0;
         loop {
-            let outcome = Laid::out(cloth, id, reach, limits)
+            let outcome = Laid::out(cloth, id, (reach, filter), limits)
                 .and_then(|laid| laid.sampled(cloth, id, limits));
             tries += 1;
             match outcome {
@@ -215,15 +229,20 @@ struct Laid {
 
 impl Laid {
     /// Grows and flattens the region; once more when the chart shows that the reach did not suit the hole.
-    fn out(cloth: &Cloth, hole: u32, reach: f64, limits: &Limits) -> Result<Laid, MendError> {
-        let laid = Self::with_reach(cloth, hole, reach, limits)?;
+    fn out(
+        cloth: &Cloth,
+        hole: u32,
+        (reach, filter): (f64, Option<&Filter>),
+        limits: &Limits,
+    ) -> Result<Laid, MendError> {
+        let laid = Self::with_reach(cloth, hole, (reach, filter), limits)?;
         let wanted = reach_for(extent(&laid.rim_uv()) * laid.chart.frame.side);
         // Only outwards if the region stopped because it was asked to, not because the cloth ended or wraps around.
         let off = wanted < reach / OFF || (wanted > reach * OFF && laid.region.reach >= reach);
         if !off {
             return Ok(laid);
         }
-        let mut again = match Self::with_reach(cloth, hole, wanted, limits) {
+        let mut again = match Self::with_reach(cloth, hole, (wanted, filter), limits) {
             Ok(again) => again,
             Err(_) => return Ok(laid),
         };
@@ -235,7 +254,7 @@ impl Laid {
     fn with_reach(
         cloth: &Cloth,
         hole: u32,
-        reach: f64,
+        (reach, filter): (f64, Option<&Filter>),
         limits: &Limits,
     ) -> Result<Laid, MendError> {
         let started = Instant::now();
@@ -249,10 +268,12 @@ impl Laid {
         .map_err(|source| MendError::Region { hole, source })?;
         let grown = milliseconds(started);
         let started = Instant::now();
-        let smooth = denoised(&region.mesh, &Filter::default()).map(|mesh| Region {
-            mesh,
-            ..region.clone()
-        });
+        let smooth = filter
+            .and_then(|f| denoised(&region.mesh, f))
+            .map(|mesh| Region {
+                mesh,
+                ..region.clone()
+            });
         let seen = smooth.as_ref().unwrap_or(&region);
         let chart = flatten::flatten(seen, &limits.flatten)
             .map_err(|source| MendError::Flatten { hole, source })?;
