@@ -2,8 +2,6 @@
 
 usage: bf16.py WEIGHTS SHEETS/sheets.safetensors      200 held-out sheets with round holes, filled smoothly"""
 
-import json
-import struct
 import sys
 
 import numpy as np
@@ -13,18 +11,10 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import splu
 
 import pytorch
+from export import read
 
 SIDE, GRIDS = 64, 200
 INPUT_SCALE, OUTPUT_SCALE = 4.0, 1.0 / 16.0  # src/net/unet.rs
-
-
-def sheets(path):
-    """`[n, 51, 51, 3]`."""
-    data = open(path, "rb").read()
-    (size,) = struct.unpack("<Q", data[:8])
-    entry = json.loads(data[8 : 8 + size])["positions"]
-    start, end = (8 + size + at for at in entry["data_offsets"])
-    return np.frombuffer(data[start:end], np.float32).reshape(entry["shape"]).astype(np.float64)
 
 
 def grid(sheet):
@@ -51,12 +41,12 @@ def filled(cells, hole):
 
 
 def main(weights, path):
-    rng, all_sheets, inputs, holes = np.random.default_rng(0), sheets(path), [], []
+    rng, sheets, inputs, holes = np.random.default_rng(0), read(path)["positions"], [], []
     places = np.stack(np.meshgrid(range(SIDE), range(SIDE), indexing="ij"), -1)
     for k in range(GRIDS):
         centre, radius = rng.uniform(24, 40, 2), rng.uniform(8, 18)
         hole = ((places - centre) ** 2).sum(-1) < radius**2
-        cells = filled(grid(all_sheets[k % len(all_sheets)]), hole)
+        cells = filled(grid(sheets[k % len(sheets)]), hole)
         inputs.append(np.concatenate([INPUT_SCALE * cells.transpose(2, 0, 1), ~hole[None]]))
         holes.append(hole)
     x, holes = np.array(inputs, np.float32), np.array(holes)

@@ -51,18 +51,8 @@ ENGINES = {
 }
 
 
-def pytorch_engine(call):
-    def build(weights, threads):
-        return call(pytorch.Network(weights), threads)
-
-    return build
-
-
-# Built from the weights file, not from the ONNX model.
-PYTORCH = {
-    "pytorch f32": pytorch_engine(pytorch.forward),
-    "pytorch f32 gradient": pytorch_engine(pytorch.gradient),
-}
+# Made of the weights file, not of the ONNX model.
+PYTORCH = {"pytorch f32": pytorch.forward, "pytorch f32 gradient": pytorch.gradient}
 
 
 def measure(call, seconds):
@@ -104,7 +94,7 @@ def main():
                 runs[name, batch, threads] = (lambda run=run, x=x: run(x))
                 outputs[name, batch] = np.array(run(x))
             for name, build in PYTORCH.items():
-                run = build(arguments.weights, threads)
+                run = build(pytorch.Network(arguments.weights), threads)
                 runs[name, batch, threads] = (lambda run=run, x=x: run(x))
             outputs["pytorch f32", batch] = runs["pytorch f32", batch, threads]()
     for batch in (1, 8):

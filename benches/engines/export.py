@@ -24,6 +24,16 @@ def read(path):
     return tensors
 
 
+def folded(tensors, name, norm=None):
+    """Weight and bias of a convolution, the norm after it folded in."""
+    weight = tensors[f"{name}.weight"]
+    if norm is None:
+        return weight, tensors[f"{name}.bias"]
+    scale, shift, mean, variance = (tensors[f"{norm}.{part}"] for part in ("scale", "shift", "mean", "variance"))
+    factor = scale / np.sqrt(variance + EPSILON)
+    return weight * factor[:, None, None, None], shift - mean * factor
+
+
 class Graph:
     """Nodes and constants of a model under construction."""
 
@@ -43,15 +53,7 @@ class Graph:
 
     def conv(self, x, name, norm=None):
         """A convolution that keeps the size, with the norm after it folded in."""
-        weight = self.tensors[f"{name}.weight"]
-        if norm is None:
-            bias = self.tensors[f"{name}.bias"]
-        else:
-            scale, shift, mean, variance = (
-                self.tensors[f"{norm}.{part}"] for part in ("scale", "shift", "mean", "variance")
-            )
-            factor = scale / np.sqrt(variance + EPSILON)
-            weight, bias = weight * factor[:, None, None, None], shift - mean * factor
+        weight, bias = folded(self.tensors, name, norm)
         side = weight.shape[-1]
         inputs = [x, self.constant(weight), self.constant(bias)]
         return self.node("Conv", inputs, kernel_shape=[side] * 2, pads=[side // 2] * 4)

@@ -1,10 +1,9 @@
 """The network of a weights file in PyTorch, batch norm folded; products in f32, or with operands rounded to bf16 and sums in f32."""
 
-import numpy as np
 import torch
 from torch.nn.functional import conv2d, interpolate, max_pool2d, pad, relu
 
-from export import EPSILON, read
+from export import folded, read
 
 # Winograd's F(4, 3): kernel, input and output transforms (Lavin & Gray 2016), as in src/net/engine/scheme.rs.
 KERNEL = [[1 / 4, 0, 0], [-1 / 6] * 3, [-1 / 6, 1 / 6, -1 / 6], [1 / 24, 1 / 12, 1 / 6], [1 / 24, -1 / 12, 1 / 6], [0, 0, 1]]
@@ -51,15 +50,8 @@ class Network:
                 continue
             stem, _, last = conv.rpartition(".")
             last = last.replace("conv", "norm") if "conv" in last else f"{last}_norm"
-            norm = f"{stem}.{last}"
-            weight = tensors[name]
-            if f"{norm}.scale" in tensors:
-                scale, shift, mean, variance = (tensors[f"{norm}.{p}"] for p in ("scale", "shift", "mean", "variance"))
-                factor = scale / np.sqrt(variance + EPSILON)
-                weight, bias = weight * factor[:, None, None, None], shift - mean * factor
-            else:
-                bias = tensors[f"{conv}.bias"]
-            self.layers[conv] = [torch.tensor(x, dtype=torch.float32) for x in (weight, bias)]
+            norm = f"{stem}.{last}" if f"{stem}.{last}.scale" in tensors else None
+            self.layers[conv] = [torch.tensor(x, dtype=torch.float32) for x in folded(tensors, conv, norm)]
 
     def conv(self, x, name):
         return self.product(x, *self.layers[name])

@@ -113,8 +113,6 @@ enum Frame {
     Given,
     /// Turned onto its chart
     Canonical,
-    /// Turned onto its chart, and told where up is
-    Hanging,
 }
 
 impl Frame {
@@ -122,7 +120,6 @@ impl Frame {
         match self {
             Self::Given => FrameKind::Given,
             Self::Canonical => FrameKind::Canonical,
-            Self::Hanging => FrameKind::Hanging,
         }
     }
 }

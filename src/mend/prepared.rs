@@ -1,5 +1,6 @@
 //! What of a hole does not depend on constraints: region, chart, grid, plan of the patch; and its cloth as it is without any.
 
+use std::cell::Cell;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
@@ -79,24 +80,30 @@ pub struct Unedited {
 impl Prepared {
     /// Prepares a hole; with smaller and smaller regions when one gives no usable chart, and at last with the scanner's noise.
     pub fn new(cloth: &Cloth, id: u32, limits: &Limits) -> Result<Prepared, MendError> {
-        match Self::seen_by(Some(&Filter::default()), cloth, id, limits) {
-            Err(error) if may_shrink(&error) => {
-                Self::seen_by(None, cloth, id, limits).map_err(|_| error)
+        let reach = reach_for(extent_at_a_glance(cloth, id));
+        let noisy = Cell::new(false);
+        let smoothed = |mesh: &TriMesh| {
+            let smooth = denoised(mesh, &Filter::default());
+            noisy.set(noisy.get() || smooth.is_some());
+            smooth
+        };
+        match Self::within((reach, &smoothed), cloth, id, limits) {
+            Err(error) if noisy.get() && may_shrink(&error) => {
+                Self::within((reach, &|_| None), cloth, id, limits).map_err(|_| error)
             }
             outcome => outcome,
         }
     }
 
-    fn seen_by(
-        filter: Option<&Filter>,
+    fn within(
+        (mut reach, smoothed): (f64, Smoothing),
         cloth: &Cloth,
         id: u32,
         limits: &Limits,
     ) -> Result<Prepared, MendError> {
-        let mut reach = reach_for(extent_at_a_glance(cloth, id));
         let mut tries = 0;
         loop {
-            let outcome = Laid::out(cloth, id, (reach, filter), limits)
+            let outcome = Laid::out(cloth, id, (reach, smoothed), limits)
                 .and_then(|laid| laid.sampled(cloth, id, limits));
             tries += 1;
             match outcome {
@@ -218,6 +225,9 @@ impl Prepared {
     }
 }
 
+/// A mesh without the scanner's noise; none where it has none.
+type Smoothing<'a> = &'a dyn Fn(&TriMesh) -> Option<TriMesh>;
+
 /// Cloth around a hole, laid flat.
 struct Laid {
     region: Region,
@@ -232,17 +242,17 @@ impl Laid {
     fn out(
         cloth: &Cloth,
         hole: u32,
-        (reach, filter): (f64, Option<&Filter>),
+        (reach, smoothed): (f64, Smoothing),
         limits: &Limits,
     ) -> Result<Laid, MendError> {
-        let laid = Self::with_reach(cloth, hole, (reach, filter), limits)?;
+        let laid = Self::with_reach(cloth, hole, (reach, smoothed), limits)?;
         let wanted = reach_for(extent(&laid.rim_uv()) * laid.chart.frame.side);
         // Only outwards if the region stopped because it was asked to, not because the cloth ended or wraps around.
         let off = wanted < reach / OFF || (wanted > reach * OFF && laid.region.reach >= reach);
         if !off {
             return Ok(laid);
         }
-        let mut again = match Self::with_reach(cloth, hole, (wanted, filter), limits) {
+        let mut again = match Self::with_reach(cloth, hole, (wanted, smoothed), limits) {
             Ok(again) => again,
             Err(_) => return Ok(laid),
         };
@@ -254,7 +264,7 @@ impl Laid {
     fn with_reach(
         cloth: &Cloth,
         hole: u32,
-        (reach, filter): (f64, Option<&Filter>),
+        (reach, smoothed): (f64, Smoothing),
         limits: &Limits,
     ) -> Result<Laid, MendError> {
         let started = Instant::now();
@@ -268,12 +278,10 @@ impl Laid {
         .map_err(|source| MendError::Region { hole, source })?;
         let grown = milliseconds(started);
         let started = Instant::now();
-        let smooth = filter
-            .and_then(|f| denoised(&region.mesh, f))
-            .map(|mesh| Region {
-                mesh,
-                ..region.clone()
-            });
+        let smooth = smoothed(&region.mesh).map(|mesh| Region {
+            mesh,
+            ..region.clone()
+        });
         let seen = smooth.as_ref().unwrap_or(&region);
         let chart = flatten::flatten(seen, &limits.flatten)
             .map_err(|source| MendError::Flatten { hole, source })?;

@@ -78,10 +78,10 @@ fn evened(mesh: &TriMesh, around: &Around) -> Vec<Vec3> {
     let moved = |v: u32| {
         let here = mesh.positions[v as usize];
         let ring = around.rings(mesh, v, 1);
-        let normal = around.normal(mesh, v)?;
         if around.is_border(v, &ring) {
             return None;
         }
+        let normal = around.normal(mesh, v)?;
         let others = ring.iter().filter(|w| **w != v);
         let sum: Vec3 = others.map(|w| mesh.positions[*w as usize]).sum();
         let d = sum / (ring.len() - 1) as f64 - here;

@@ -158,11 +158,10 @@ impl Plan {
             patch.positions = self.with_rim(&positions);
             self.surroundings.separate(&mut patch);
         }
-        if self.shift.is_some() {
+        if let Some(shift) = &self.shift {
             patch.crossings = None;
-        }
-        for (p, shift) in patch.positions.iter_mut().zip(self.shift.iter().flatten()) {
-            *p += shift;
+            let each = patch.positions.iter_mut().zip(shift);
+            each.for_each(|(p, shift)| *p += shift);
         }
         Ok(patch)
     }

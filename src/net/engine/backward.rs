@@ -1,10 +1,11 @@
 //! The adjoint pass: from the gradient with respect to the network's last features to the one with respect to its input.
 
-use super::convolve::{Finish, Work};
+use super::convolve::Work;
 use super::forward::{Activations, Saved, levels};
 use super::map::{Map, panels};
 use super::network::{DOWN, Folds, Forward, Reverse, side};
 use super::pack::Layer;
+use super::share::Finish;
 use super::simd::{Kernel, Simd, Target};
 use super::sums::WeightSums;
 

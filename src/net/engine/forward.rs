@@ -1,9 +1,10 @@
 //! The network's forward pass over maps: room for its activations, and the way through them.
 
-use super::convolve::{Finish, Work};
+use super::convolve::Work;
 use super::map::{Map, panels};
 use super::network::{DOWN, Folds, Forward, side};
 use super::pack::Layer;
+use super::share::Finish;
 use super::simd::{Block, Target};
 
 /// Room for a forward pass of some images.

@@ -13,6 +13,7 @@ mod network;
 mod pack;
 mod scheme;
 mod scratch;
+mod share;
 mod simd;
 mod sums;
 

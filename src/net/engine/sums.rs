@@ -272,11 +272,7 @@ impl UpSums {
                 to.iter_mut().zip(from).for_each(|(to, x)| *to = [*x; 2]);
             }
         }
-        let x = Source {
-            map: &self.wide,
-            first: 0,
-        };
-        self.conv.add(target, images, x, by);
+        self.conv.add(target, images, self.wide.all(), by);
     }
 }
 
