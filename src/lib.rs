@@ -6,6 +6,7 @@
 // Allowed in `net/engine/simd.rs` alone, where each block says why it is sound.
 #![deny(unsafe_code)]
 
+mod cholesky;
 pub mod contract;
 pub mod edit;
 pub mod evaluate;

@@ -4,7 +4,7 @@
 
 use serde::Serialize;
 
-use crate::flatten::cholesky::{NotPositive, Symmetric};
+use crate::cholesky::{NotPositive, Symmetric};
 use crate::grid::{CELLS, SIDE, neighbour_pairs};
 use crate::mesh::Vec3;
 

@@ -7,8 +7,8 @@ use std::collections::VecDeque;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::cholesky::{Factor, Symmetric};
 use super::{FlattenError, RestTriangle};
+use crate::cholesky::{Factor, Symmetric};
 use crate::mesh::{TriMesh, Vec2};
 
 /// Most rounds of local and global steps; the stop test usually ends them long before.

@@ -2,8 +2,8 @@
 
 use nalgebra::Matrix2;
 
-use super::cholesky::Symmetric;
 use super::{FlattenError, RestTriangle};
+use crate::cholesky::Symmetric;
 use crate::mesh::{TriMesh, Vec2};
 
 /// Most steps; each refactors a system twice the size of ARAP's.

@@ -1,9 +1,8 @@
 //! From a region of cloth to its chart: unfolded face by face, relaxed by ARAP, the grid read off the result.
-//! Stages: `transport` → `arap` → (only when faces flip) `tutte` → `arap`, `dirichlet` → `raster`; all share the sparse factor in `cholesky`.
+//! Stages: `transport` → `arap` → (only when faces flip) `tutte` → `arap`, `dirichlet` → `raster`; all share one sparse factor.
 //! No holes are filled here and no file formats known; what is uncertain is reported as numbers or refused with them.
 
 mod arap;
-pub(crate) mod cholesky;
 mod dirichlet;
 mod frame;
 mod raster;

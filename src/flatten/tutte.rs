@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::FlattenError;
-use super::cholesky::Symmetric;
+use crate::cholesky::Symmetric;
 use crate::mesh::{TriMesh, Vec2};
 
 /// Embeds a disk whose inner `loops` are each closed by one virtual vertex joined to all of the loop.

@@ -59,7 +59,7 @@ pub fn make(
     let (anchors, edits) = wishes.kept(&patch)?;
 
     let started = Instant::now();
-    let quality = quality::measure(&patch, &prepared.region, &prepared.others);
+    let quality = quality::measure(&patch, &prepared.region);
     timings.report = milliseconds(started);
     let mut notes = notes(prepared, &quality);
     notes.extend(wishes.notes(&anchors));

@@ -11,7 +11,7 @@ use crate::contract::v1;
 use crate::edit::{HoleCells, Reach};
 use crate::flatten::{self, Chart};
 use crate::grid::{self, CELLS, Grid, NormalGrid, Normalisation};
-use crate::mesh::denoise::{Filter, denoised};
+use crate::mesh::denoise::denoised;
 use crate::mesh::layers::layers_near;
 use crate::mesh::region::{self, Region};
 use crate::mesh::{TriMesh, Vec2, Vec3};
@@ -41,8 +41,6 @@ pub struct Prepared {
     pub chart: Chart,
     /// How it will be meshed.
     pub plan: Plan,
-    /// Cloth of the scan near the hole that is not of its region.
-    pub others: TriMesh,
     /// What the grid knows of the scan.
     pub grid: Grid,
     /// Brings the grid to the network's units and back.
@@ -83,7 +81,7 @@ impl Prepared {
         let reach = reach_for(extent_at_a_glance(cloth, id));
         let noisy = Cell::new(false);
         let smoothed = |mesh: &TriMesh| {
-            let smooth = denoised(mesh, &Filter::default());
+            let smooth = denoised(mesh);
             noisy.set(noisy.get() || smooth.is_some());
             smooth
         };
@@ -212,7 +210,6 @@ impl Prepared {
     pub fn bytes(&self) -> usize {
         let mesh = |m: &TriMesh| 24 * m.positions.len() + 12 * m.faces.len();
         let region = mesh(&self.region.mesh)
-            + mesh(&self.others)
             + 4 * (self.region.vertices.len() + self.region.faces.len())
             + 16 * self.chart.flat.len();
         // Known flag, position, place among the hole's cells, base.
@@ -331,11 +328,11 @@ impl Laid {
                     None => Ok(plan),
                 })
                 .map_err(|source| MendError::Patch { hole: id, source })?;
-            Ok::<_, MendError>((plan.among(&others), others, milliseconds(started)))
+            Ok::<_, MendError>((plan.among(&others), milliseconds(started)))
         };
         let (sampled, planned) = rayon::join(sample, plan);
         let (grid, normal, cells, base, raster) = sampled?;
-        let (plan, others, patch) = planned?;
+        let (plan, patch) = planned?;
         let report = grid_report(&grid, &normal, &polygon);
         let timings = v1::HoleTimings {
             raster,
@@ -352,7 +349,6 @@ impl Laid {
         Ok(Prepared {
             id,
             plan,
-            others,
             grid,
             normal,
             cells,

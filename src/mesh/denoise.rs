@@ -1,96 +1,61 @@
 //! Noise of a scanner on cloth: how much there is, and the surface without it.
 //!
-//! The level is what vertices stand off from a quadric through the two rings around them; folds are quadrics at that scale, noise is not.
-//! Noise is taken off by moving every vertex onto the quadric through the rings around it (moving least squares of degree 2; Levin 2004),
-//! and then along the surface towards the middle of its neighbours: noise along the surface folds triangles over, and laid flat each of them
-//! asks for its area twice.
+//! The level is what vertices stand off from a cubic through the two rings around them; folds are cubics at that scale, noise is not.
+//! Noise is taken off by a smoothing spline over the mesh: every vertex gives way to the bending energy of all of them, the more the
+//! noisier the scan is. Where neighbours are far apart along the surface, that moves them towards each other, too: noise along the surface
+//! folds triangles over, and laid flat each of them asks for its area twice.
 
 use nalgebra::{SMatrix, SVector};
 
 use super::topology::corners_by_vertex;
 use super::{TriMesh, Vec3};
+use crate::cholesky::Symmetric;
 
+/// Level, in mean edges, below which a mesh counts as clean. Cloth without noise reads 0.00 to 0.05, crumpled or not.
+const CLEAN: f64 = 0.06;
+/// Weight of the bending energy at a level of one edge; it grows with the level's square, as the noise's own energy does.
+const STIFFNESS: f64 = 40.0;
+/// The same along a border: a ragged one is no noise.
+const BORDER_STIFFNESS: f64 = 12.0;
 /// Vertices that the level is estimated from, about; evenly spread over the numbering.
 const SAMPLES: usize = 1000;
 /// As many show that a scan is far from noisy, as most are.
 const GLANCE: usize = 150;
-/// What a vertex stands off from the quadric through its two rings, in standard deviations of the noise: its own and the quadric's.
-const OWN_AND_FIT: f64 = 1.2;
 /// Mean of |x| below its median, of a standard normal variable. The lower half, for noise is everywhere, folds are not.
 const LOWER_HALF: f64 = 0.3247;
-
-/// How strongly noise is taken off.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Filter {
-    /// Level, in mean edges, below which a mesh counts as clean. Cloth without noise reads 0.01 to 0.07, the most crumpled 0.1 to 0.14.
-    pub clean: f64,
-    /// Rings of vertices around a vertex that its quadric goes through.
-    pub rings: usize,
-    /// Spread of the weights, in the largest distance: at no noise, and what a level of one edge adds. Wide ones cost folds.
-    pub spread: [f64; 2],
-    /// Rounds of moving along the surface, halfway to the neighbours' middle each.
-    pub evening: usize,
-}
-
-impl Default for Filter {
-    fn default() -> Self {
-        Filter {
-            clean: 0.12,
-            rings: 2,
-            spread: [0.15, 0.85],
-            evening: 2,
-        }
-    }
-}
+/// Terms of a cubic in two variables.
+const TERMS: usize = 10;
 
 /// The mesh with its noise taken off; `None` when there is none worth mentioning.
 ///
-/// Same faces, same vertices, only their positions differ. Works on any mesh; O(vertices · rings²).
-pub fn denoised(mesh: &TriMesh, filter: &Filter) -> Option<TriMesh> {
+/// Same faces, same vertices, only their positions differ: x minimises Σ |xᵥ − scannedᵥ|² + λ Σ |mean of v's neighbours − xᵥ|², along the
+/// border with neighbours there alone. Works on any mesh; one sparse factor.
+pub fn denoised(mesh: &TriMesh) -> Option<TriMesh> {
     let around = Around::of(mesh);
-    if level(mesh, &around, GLANCE) < 0.5 * filter.clean {
+    if level(mesh, &around, GLANCE) < 0.5 * CLEAN {
         return None;
     }
     let level = level(mesh, &around, SAMPLES);
-    (level > filter.clean && level.is_finite()).then(|| {
-        let spread = filter.spread[0] + filter.spread[1] * level;
-        let moved = (0..mesh.positions.len() as u32).map(|v| {
-            let here = mesh.positions[v as usize];
-            let wide = around.rings(mesh, v, filter.rings);
-            let fit = fitted(mesh, &around, (v, &wide), |d| {
-                (-0.5 * (d / spread).powi(2)).exp()
-            });
-            fit.map_or(here, |(normal, off)| here + normal * off)
-        });
-        let mut smooth = TriMesh {
-            positions: moved.collect(),
-            faces: mesh.faces.clone(),
-        };
-        for _ in 0..filter.evening {
-            smooth.positions = evened(&smooth, &around);
+    if !(level > CLEAN && level.is_finite()) {
+        return None;
+    }
+    let mut energy = Symmetric::zero(mesh.positions.len());
+    for v in 0..mesh.positions.len() {
+        energy.add(v, v, 1.0);
+        let (neighbours, stiffness) = around.neighbours(mesh, v as u32);
+        let share = 1.0 / neighbours.len() as f64;
+        let bend = neighbours.iter().map(|w| (*w as usize, share));
+        let bend: Vec<_> = bend.chain([(v, -1.0)]).collect();
+        if !neighbours.is_empty() {
+            energy.add_square(&bend, stiffness * level * level);
         }
-        smooth
+    }
+    let mut smooth: Vec<[f64; 3]> = mesh.positions.iter().map(|p| (*p).into()).collect();
+    energy.factor().ok()?.solve(&mut smooth).ok()?;
+    Some(TriMesh {
+        positions: smooth.into_iter().map(Vec3::from).collect(),
+        faces: mesh.faces.clone(),
     })
-}
-
-/// Inner vertices halfway along the surface to the middle of their neighbours.
-fn evened(mesh: &TriMesh, around: &Around) -> Vec<Vec3> {
-    let moved = |v: u32| {
-        let here = mesh.positions[v as usize];
-        let ring = around.rings(mesh, v, 1);
-        if around.is_border(v, &ring) {
-            return None;
-        }
-        let normal = around.normal(mesh, v)?;
-        let others = ring.iter().filter(|w| **w != v);
-        let sum: Vec3 = others.map(|w| mesh.positions[*w as usize]).sum();
-        let d = sum / (ring.len() - 1) as f64 - here;
-        Some(here + (d - normal * normal.dot(&d)) * 0.5)
-    };
-    (0u32..)
-        .zip(&mesh.positions)
-        .map(|(v, here)| moved(v).unwrap_or(*here))
-        .collect()
 }
 
 /// The corners at every vertex; a corner's face is a third of its number.
@@ -106,15 +71,34 @@ impl Around {
     }
 
     /// The faces at a vertex, ascending.
-    fn faces_at(&self, vertex: u32) -> impl ExactSizeIterator<Item = u32> {
+    fn faces_at(&self, vertex: u32) -> impl Iterator<Item = u32> {
         let v = vertex as usize;
         let corners = &self.corners[self.starts[v] as usize..self.starts[v + 1] as usize];
         corners.iter().map(|corner| corner / 3)
     }
 
-    /// Whether a vertex with this ring, itself included, lies on a border: there is one neighbour more than there are faces.
-    fn is_border(&self, vertex: u32, ring: &[u32]) -> bool {
-        ring.len() != self.faces_at(vertex).len() + 1
+    /// The other corners of the faces at a vertex, ascending: twice those inside, once those that follow on a border.
+    fn others(&self, mesh: &TriMesh, vertex: u32) -> Vec<u32> {
+        let corners = self.faces_at(vertex).flat_map(|f| mesh.faces[f as usize]);
+        let mut others: Vec<u32> = corners.filter(|w| *w != vertex).collect();
+        others.sort_unstable();
+        others
+    }
+
+    fn is_border(&self, mesh: &TriMesh, vertex: u32) -> bool {
+        once(&self.others(mesh, vertex)).next().is_some()
+    }
+
+    /// A vertex's neighbours, ascending, of one on a border those on the border; and how stiffly it keeps to their middle.
+    fn neighbours(&self, mesh: &TriMesh, vertex: u32) -> (Vec<u32>, f64) {
+        let mut others = self.others(mesh, vertex);
+        let border: Vec<u32> = once(&others).collect();
+        others.dedup();
+        if border.is_empty() {
+            (others, STIFFNESS)
+        } else {
+            (border, BORDER_STIFFNESS)
+        }
     }
 
     /// The normal at a vertex, weighted by area.
@@ -124,19 +108,25 @@ impl Around {
         sum.try_normalize(0.0)
     }
 
-    /// The vertices within so many edges of a vertex, itself included, ascending.
-    fn rings(&self, mesh: &TriMesh, vertex: u32, rings: usize) -> Vec<u32> {
-        let mut found = vec![vertex];
-        for _ in 0..rings {
-            let faces = found.iter().flat_map(|&v| self.faces_at(v));
-            let corners = faces.flat_map(|f| mesh.faces[f as usize]);
-            let mut wider: Vec<u32> = corners.collect();
-            wider.sort_unstable();
-            wider.dedup();
-            found = wider;
-        }
+    /// The vertices within two edges of a vertex, without itself, ascending.
+    fn two_rings(&self, mesh: &TriMesh, vertex: u32) -> Vec<u32> {
+        let ring = self.others(mesh, vertex);
+        let mut found: Vec<u32> = ring.iter().flat_map(|w| self.others(mesh, *w)).collect();
+        found.extend(ring);
+        found.sort_unstable();
+        found.dedup();
+        found.retain(|w| *w != vertex);
         found
     }
+}
+
+/// What is in a sorted list once.
+fn once(sorted: &[u32]) -> impl Iterator<Item = u32> {
+    let alike = sorted.chunk_by(|a, b| a == b);
+    alike.filter_map(|all| match all {
+        [one] => Some(*one),
+        _ => None,
+    })
 }
 
 /// Standard deviation of the noise across the surface, in mean edges; 0 for a mesh with no inner vertices.
@@ -144,6 +134,7 @@ fn level(mesh: &TriMesh, around: &Around, samples: usize) -> f64 {
     let stride = (mesh.positions.len() / samples).max(1);
     let mut off: Vec<f64> = (0..mesh.positions.len() as u32)
         .step_by(stride)
+        .filter(|v| !around.is_border(mesh, *v))
         .filter_map(|v| stand_off(mesh, around, v))
         .collect();
     if off.is_empty() {
@@ -152,28 +143,16 @@ fn level(mesh: &TriMesh, around: &Around, samples: usize) -> f64 {
     let half = off.len().div_ceil(2);
     off.select_nth_unstable_by(half - 1, f64::total_cmp);
     let mean = off[..half].iter().sum::<f64>() / half as f64;
-    mean / (LOWER_HALF * OWN_AND_FIT) / mean_edge(mesh).max(f64::MIN_POSITIVE)
+    mean / LOWER_HALF / mean_edge(mesh).max(f64::MIN_POSITIVE)
 }
 
-/// How far an inner vertex lies from the quadric through the two rings around it, scene units; `None` at the border.
+/// How far an inner vertex lies from the cubic fitted to the two rings around it, scene units, in standard deviations of one vertex: the
+/// cubic's own error there is taken off. `None` where the rings do not determine a cubic.
 fn stand_off(mesh: &TriMesh, around: &Around, vertex: u32) -> Option<f64> {
-    if around.is_border(vertex, &around.rings(mesh, vertex, 1)) {
+    let rings = around.two_rings(mesh, vertex);
+    if rings.len() <= TERMS {
         return None;
     }
-    let mut rings = around.rings(mesh, vertex, 2);
-    rings.retain(|&v| v != vertex);
-    let (_, off) = fitted(mesh, around, (vertex, &rings), |_| 1.0)?;
-    Some(off.abs())
-}
-
-/// The normal at a vertex, and how far along it the quadric passes that is fitted to some vertices around it, scene units. `weight` is
-/// given distances relative to the farthest.
-fn fitted(
-    mesh: &TriMesh,
-    around: &Around,
-    (vertex, others): (u32, &[u32]),
-    weight: impl Fn(f64) -> f64,
-) -> Option<(Vec3, f64)> {
     let centre = mesh.positions[vertex as usize];
     let place = |v: &u32| mesh.positions[*v as usize] - centre;
     let normal = around.normal(mesh, vertex)?;
@@ -181,18 +160,24 @@ fn fitted(
     axis[normal.iamin()] = 1.0;
     let across = normal.cross(&axis).normalize();
     let along = normal.cross(&across);
-    let size = others.iter().map(|v| place(v).norm()).fold(0.0, f64::max);
-    let mut matrix = SMatrix::<f64, 6, 6>::identity() * 1e-9;
-    let mut rhs = SVector::<f64, 6>::zeros();
-    for p in others.iter().map(|v| place(v) / size) {
+    let size = rings.iter().map(|v| place(v).norm()).fold(0.0, f64::max);
+    let mut matrix = SMatrix::<f64, TERMS, TERMS>::identity() * 1e-9;
+    let mut rhs = SVector::<f64, TERMS>::zeros();
+    for p in rings.iter().map(|v| place(v) / size) {
         let (x, y, z) = (p.dot(&across), p.dot(&along), p.dot(&normal));
-        let row = SVector::<f64, 6>::from([1.0, x, y, x * x, x * y, y * y]);
-        let weighted = row * weight(p.norm());
-        matrix += weighted * row.transpose();
-        rhs += weighted * z;
+        let quadric = [1.0, x, y, x * x, x * y, y * y];
+        let cubic = [x * x * x, x * x * y, x * y * y, y * y * y];
+        let row = SVector::<f64, TERMS>::from_iterator(quadric.into_iter().chain(cubic));
+        matrix += row * row.transpose();
+        rhs += row * z;
     }
-    let off = matrix.cholesky()?.solve(&rhs)[0] * size;
-    off.is_finite().then_some((normal, off))
+    let factor = matrix.cholesky()?;
+    let mut at_centre = SVector::<f64, TERMS>::zeros();
+    at_centre[0] = 1.0;
+    // The variance of the cubic's value at the vertex, in that of one neighbour.
+    let error = factor.solve(&at_centre)[0];
+    let off = factor.solve(&rhs)[0] * size / (1.0 + error).sqrt();
+    off.is_finite().then_some(off.abs())
 }
 
 fn doubled_normal(mesh: &TriMesh, face: u32) -> Vec3 {
@@ -246,7 +231,7 @@ mod tests {
         fn clean_cloth_is_left_alone(n in 24usize..40, fold in 0.0..12.0f64) {
             let folded = sheet(n, |_, _| true, |u, v| Vec3::new(u, v, 0.05 * (fold * (u + v)).sin()));
             prop_assert!(noise_level(&folded) < 0.03, "{}", noise_level(&folded));
-            prop_assert_eq!(denoised(&folded, &Filter::default()), None);
+            prop_assert_eq!(denoised(&folded), None);
         }
 
         #[test]
@@ -255,12 +240,12 @@ mod tests {
             // Even over ± noise; the mean edge of the squares' halves is 1.14 of their side.
             let true_level = noise / 3f64.sqrt() / 1.14;
             let level = noise_level(&noisy);
-            prop_assert!((level / true_level - 1.0).abs() < 0.35, "{level} {true_level}");
-            let smooth = denoised(&noisy, &Filter { clean: 0.05, ..Filter::default() });
+            prop_assert!((level / true_level - 1.0).abs() < 0.2, "{level} {true_level}");
+            let smooth = denoised(&noisy);
             prop_assert!(smooth.is_some());
             if let Some(smooth) = smooth {
                 prop_assert_eq!(&smooth.faces, &noisy.faces);
-                prop_assert!(off(&smooth, n) < 0.85 * off(&noisy, n), "{} {}", off(&smooth, n), off(&noisy, n));
+                prop_assert!(off(&smooth, n) < 0.7 * off(&noisy, n), "{} {}", off(&smooth, n), off(&noisy, n));
                 prop_assert!(folded_over(&smooth) * 4 <= folded_over(&noisy), "{} {}", folded_over(&smooth), folded_over(&noisy));
             }
         }
@@ -269,7 +254,7 @@ mod tests {
     #[test]
     fn meshes_without_inside_have_no_level() {
         assert_eq!(noise_level(&TriMesh::default()), 0.0);
-        assert_eq!(denoised(&TriMesh::default(), &Filter::default()), None);
+        assert_eq!(denoised(&TriMesh::default()), None);
         assert_eq!(noise_level(&holed_sheet(1, 0.0)), 0.0);
     }
 }

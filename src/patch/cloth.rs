@@ -5,8 +5,8 @@
 
 use nalgebra::{Matrix2, Matrix3x2};
 
+use crate::cholesky::{Factor, NotPositive, Symmetric};
 use crate::flatten::RestTriangle;
-use crate::flatten::cholesky::{Factor, NotPositive, Symmetric};
 use crate::mesh::{Vec2, Vec3};
 
 use super::anderson::Anderson;

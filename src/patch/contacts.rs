@@ -62,6 +62,12 @@ impl Surroundings {
         }
     }
 
+    /// The same where the region's vertices lie elsewhere.
+    pub fn around(mut self, region: &[Vec3]) -> Surroundings {
+        self.positions[..region.len()].copy_from_slice(region);
+        self
+    }
+
     /// The same with other cloth that the patch must not cut: layers that lie over or under it, beyond the region.
     pub fn among(mut self, others: &TriMesh) -> Surroundings {
         let (base, more) = (self.positions.len() as u32, others.positions.len() as u32);
@@ -114,7 +120,7 @@ impl Surroundings {
             }
         }
         patch.collisions += found - least;
-        patch.crossings = Some(least);
+        patch.crossings = least;
     }
 
     /// One step along the gradients of the crossing curves.
@@ -279,7 +285,7 @@ mod tests {
             faces: tile_faces,
             strain_rounds: 0,
             collisions: 0,
-            crossings: None,
+            crossings: 0,
         };
         let joined = |tile: &[Vec3]| TriMesh {
             positions: around.positions.iter().chain(tile).copied().collect(),
@@ -288,7 +294,7 @@ mod tests {
         let before = crossings(&joined(&tile), first_face).len();
         assert!(before > 0);
         around.separate(&mut patch);
-        assert_eq!((patch.collisions, patch.crossings), (before, Some(0)));
+        assert_eq!((patch.collisions, patch.crossings), (before, 0));
         assert_eq!(crossings(&joined(&patch.positions), first_face), []);
         let again = patch.positions.clone();
         around.separate(&mut patch);
@@ -319,7 +325,7 @@ mod tests {
         alone.clone().separate(&mut patch);
         assert_eq!(patch.collisions, 0, "it does not cut itself");
         alone.among(&layer).separate(&mut patch);
-        assert_eq!((patch.collisions, patch.crossings), (before, Some(0)));
+        assert_eq!((patch.collisions, patch.crossings), (before, 0));
         assert_eq!(patch.positions, again);
     }
 }

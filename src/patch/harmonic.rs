@@ -1,7 +1,7 @@
 //! Harmonic extension over a triangulated patch: values held at some vertices, as smooth as can be (Dirichlet energy) at all others.
 
+use crate::cholesky::{Factor, NotPositive, Symmetric};
 use crate::flatten::RestTriangle;
-use crate::flatten::cholesky::{Factor, NotPositive, Symmetric};
 use crate::mesh::Vec2;
 
 /// The factored Laplacian of a patch for one set of held vertices.

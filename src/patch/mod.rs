@@ -75,8 +75,8 @@ pub struct Patch {
     pub strain_rounds: usize,
     /// Pairs of triangles that crossed after strain limiting and were pushed apart.
     pub collisions: usize,
-    /// Pairs of triangles, at least one of the patch, that cross still; none where the patch was moved after they were counted.
-    pub crossings: Option<usize>,
+    /// Pairs of triangles, at least one of the patch, that cross still.
+    pub crossings: usize,
 }
 
 impl Patch {

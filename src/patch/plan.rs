@@ -73,6 +73,7 @@ impl Plan {
             .collect();
         let spread = self.seam.extend(&gaps).map_err(|_| singular("seam"))?;
         self.shift = Some(spread.into_iter().map(Vec3::from).collect());
+        self.surroundings = self.surroundings.around(positions);
         Ok(self)
     }
 
@@ -146,24 +147,29 @@ impl Plan {
             faces: self.tiled.faces.clone(),
             strain_rounds: rest.map_err(|_| singular("strain"))?.rounds,
             collisions: 0,
-            crossings: None,
+            crossings: 0,
         };
+        self.shift(&mut patch, 1.0);
         self.surroundings.separate(&mut patch);
         let grips = self.grips(pulls, chart);
         if !grips.is_empty() {
+            self.shift(&mut patch, -1.0);
             let inner = patch.positions[self.own.len()..].to_vec();
             let mut positions = self.hem.with_inner(inner);
             let rounds = self.pull(fabric, &mut positions, &grips, elastics);
             patch.strain_rounds += rounds.map_err(|_| singular("strain"))?;
             patch.positions = self.with_rim(&positions);
+            self.shift(&mut patch, 1.0);
             self.surroundings.separate(&mut patch);
         }
-        if let Some(shift) = &self.shift {
-            patch.crossings = None;
-            let each = patch.positions.iter_mut().zip(shift);
-            each.for_each(|(p, shift)| *p += shift);
-        }
         Ok(patch)
+    }
+
+    /// Moves a patch to where the rim really lies, or back from there.
+    fn shift(&self, patch: &mut Patch, share: f64) {
+        let by = self.shift.as_deref().unwrap_or_default();
+        let each = patch.positions.iter_mut().zip(by);
+        each.for_each(|(p, by)| *p += by * share);
     }
 
     /// The rim's own positions, then the inner ones of a hem.

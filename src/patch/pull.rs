@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, Dyn, LU};
 
-use crate::flatten::cholesky::NotPositive;
+use crate::cholesky::NotPositive;
 use crate::mesh::{Vec2, Vec3};
 
 use super::cloth::Fabric;

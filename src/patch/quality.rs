@@ -1,7 +1,6 @@
 //! What a patch is worth, in numbers that the report carries.
 
 use super::Patch;
-use super::crossings::crossings;
 use crate::mesh::TriMesh;
 use crate::mesh::region::Region;
 
@@ -22,8 +21,8 @@ pub struct Quality {
     pub self_intersections: usize,
 }
 
-/// Measures a patch against its chart, the region it closes, and other layers of the scan that it may cut.
-pub fn measure(patch: &Patch, region: &Region, others: &TriMesh) -> Quality {
+/// Measures a patch against its chart and the region it closes.
+pub fn measure(patch: &Patch, region: &Region) -> Quality {
     let (mut edges, mut sum, mut most) = (0usize, 0.0, 0.0f64);
     let mut area = 0.0;
     let mut angles = vec![0.0; patch.positions.len()];
@@ -57,7 +56,7 @@ pub fn measure(patch: &Patch, region: &Region, others: &TriMesh) -> Quality {
         stretch_max: if edges == 0 { 1.0 } else { most },
         gaussian_curvature: defects / inner.len().max(1) as f64,
         seam_gap: patch.rim.iter().enumerate().map(gap).fold(0.0, f64::max),
-        self_intersections: (patch.crossings).unwrap_or_else(|| cuts(patch, region, others)),
+        self_intersections: patch.crossings,
     }
 }
 
@@ -75,14 +74,4 @@ pub fn joined(patch: &Patch, region: &Region) -> TriMesh {
     };
     mesh.faces.extend(patch.faces.iter().map(|f| f.map(place)));
     mesh
-}
-
-fn cuts(patch: &Patch, region: &Region, others: &TriMesh) -> usize {
-    let mut mesh = joined(patch, region);
-    let (base, first) = (mesh.positions.len() as u32, region.mesh.faces.len());
-    mesh.positions.extend_from_slice(&others.positions);
-    let others = others.faces.iter().map(|f| f.map(|v| base + v));
-    let first_of_patch = first + others.len();
-    mesh.faces.splice(first..first, others);
-    crossings(&mesh, first_of_patch).len()
 }

@@ -2,10 +2,10 @@
 
 use super::*;
 use crate::flatten::{Frame, Limits, flatten};
-use crate::mesh::TriMesh;
+use crate::mesh::intersect::intersections_with;
 use crate::mesh::loops::{LoopKind, boundary_loops};
 use crate::mesh::region;
-use crate::mesh::shapes::sheet;
+use crate::mesh::shapes::{shaken, sheet};
 use crate::mesh::topology::Topology;
 use crate::mesh::weld::weld;
 
@@ -60,8 +60,8 @@ fn pulled(slack: f64, to: Vec3, hold: Hold) -> (Patch, Patch, Vec3, f64) {
         "the rim does not move"
     );
     let off = (patch.at(pull.at) - pull.to).norm();
-    let stretch = quality::measure(&patch, &region, &TriMesh::default()).stretch_max;
-    let usual = quality::measure(&free, &region, &TriMesh::default()).stretch_max;
+    let stretch = quality::measure(&patch, &region).stretch_max;
+    let usual = quality::measure(&free, &region).stretch_max;
     assert!(
         stretch <= (1.05 * usual).max(1.25) + 1e-9,
         "{stretch} {usual}"
@@ -148,4 +148,48 @@ fn a_pull_draws_no_pimple() {
     for v in near {
         assert!(moved(v) > 0.6 * moved(middle), "{}", moved(v));
     }
+}
+
+#[test]
+fn a_patch_meets_the_rim_where_it_really_lies_and_keeps_off_other_cloth_there() {
+    let (region, chart, filled) = wavy(1.0);
+    let (plain, free, middle) = unpulled(&region, &chart, &filled);
+    let up = Vec3::new(0.0, 0.0, 0.05);
+    let mut noisy = region.clone();
+    noisy.mesh = shaken(&region.mesh, 0.002, 1);
+    noisy.mesh.positions.iter_mut().for_each(|p| *p += up);
+    // Slightly tilted, through the middle of where the patch comes to lie, clear of where it would lie without the shift.
+    let centre = free.positions[middle] + up;
+    let layer = sheet(
+        4,
+        |_, _| true,
+        |u, v| {
+            let (x, y) = (0.1 * (u - 0.5), 0.1 * (v - 0.5));
+            centre + Vec3::new(x, y, 0.1 * x)
+        },
+    );
+    let layer = weld(&layer).mesh;
+    let cuts = |patch: &Patch| {
+        let mut all = quality::joined(patch, &noisy);
+        let own: Vec<u32> = (region.mesh.faces.len() as u32..all.faces.len() as u32).collect();
+        let base = all.positions.len() as u32;
+        all.positions.extend_from_slice(&layer.positions);
+        all.faces
+            .extend(layer.faces.iter().map(|f| f.map(|v| base + v)));
+        intersections_with(&all, &own).len()
+    };
+    let joining = plain.joining(&noisy.mesh.positions).unwrap();
+    let patch = |plan: &Plan| {
+        plan.patch(&chart, &filled, &[], &Options::default())
+            .unwrap()
+    };
+    let through = patch(&joining);
+    assert!(cuts(&through) > 0, "nothing told it of the layer");
+    let beside = patch(&joining.among(&layer));
+    let wanted = (beside.rim.iter()).map(|v| noisy.mesh.positions[*v as usize]);
+    for (own, wanted) in beside.positions.iter().zip(wanted) {
+        assert!((own - wanted).norm() < 1e-12);
+    }
+    assert!(beside.collisions > 0);
+    assert_eq!((beside.crossings, cuts(&beside)), (0, 0));
 }

@@ -1,8 +1,8 @@
 //! Pulls on a planned patch: where they take hold, and how far the cloth follows.
 
 use super::{Plan, grid};
+use crate::cholesky::NotPositive;
 use crate::flatten::Chart;
-use crate::flatten::cholesky::NotPositive;
 use crate::mesh::{Vec2, Vec3};
 use crate::patch::cloth::{Elastics, Fabric};
 use crate::patch::locate;

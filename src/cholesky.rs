@@ -1,5 +1,5 @@
 //! A sparse symmetric positive definite matrix, factored once and solved many times (faer's supernodal Cholesky).
-//! Shared by the flattening and the patch; knows nothing of meshes.
+//! Shared by all that solves on meshes and grids; knows nothing of either.
 
 use faer::linalg::solvers::SolveCore;
 use faer::sparse::linalg::solvers::Llt;
