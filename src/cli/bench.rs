@@ -2,12 +2,13 @@
 
 use super::failure::{Failure, OrFail};
 use super::files;
-use super::network::NetworkArgs;
+use super::network::mender;
 use darn::contract::Constraints;
 use darn::grid::{CELLS, NormalGrid, SIDE};
 use darn::net::engine::{Engine, Gradient, Input, Isa, Options, Scratch};
 use darn::net::{BackendKind, NetError, Network, UnetConfig, weights};
 use darn::scan::{Limits, Scan};
+use darn::serve::NetworkArgs;
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -312,7 +313,7 @@ fn spread(numbers: &mut [f64]) -> (f64, f64) {
 fn mend(args: &MendArgs) -> Result<(), Failure> {
     let name = args.scan.display();
     let bytes = files::read(&args.scan)?;
-    let mender = args.network.mender()?;
+    let mender = mender(&args.network)?;
     let mut stages: Vec<(&str, Vec<f64>)> = Vec::new();
     for _ in 0..=args.times {
         let started = Instant::now();

@@ -3,7 +3,7 @@
 use super::failure::{Failure, OrFail};
 use super::files;
 use super::mended::mended;
-use super::network::NetworkArgs;
+use super::network::mender;
 use super::progress::Progress;
 use darn::evaluate::{self, Cut, EvaluateError, Plan, Report, ScanRow, Scanner, Shares};
 use darn::grid::NormalGrid;
@@ -11,6 +11,7 @@ use darn::net::Averaging;
 use darn::patch::Options;
 use darn::scarffolds::samples::{Sampler, Turning};
 use darn::scarffolds::sheets::{self, Sheet};
+use darn::serve::NetworkArgs;
 use image::ImageFormat;
 use serde_json::json;
 use std::io::Cursor;
@@ -70,7 +71,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if args.masks {
         return masks(args, &sheets, &evaluate::of_samples(&cases));
     }
-    let mender = args.network.mender()?;
+    let mender = mender(&args.network)?;
     let network = mender.networks.default();
     let fill = |grids: &[NormalGrid]| {
         let filled = match args.once {

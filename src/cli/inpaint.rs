@@ -3,11 +3,12 @@
 use super::failure::{Failure, OrFail};
 use super::files;
 use super::holes::kind;
-use super::network::NetworkArgs;
+use super::network::mender;
 use super::progress::Progress;
 use darn::contract::v1::{HoleReport, Report};
 use darn::contract::{self, Constraints, FieldError};
 use darn::scan::{Limits, Scan};
+use darn::serve::NetworkArgs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -41,7 +42,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let scan = Scan::read(&bytes, &Limits::default()).or_fail(format!("read {name}"))?;
     let read = started.elapsed();
     progress.stage("loading weights");
-    let mender = args.network.mender()?;
+    let mender = mender(&args.network)?;
     progress.stage("mending");
     let mended = darn::mend::mend(&scan, &constraints, &mender)
         .or_fail(format!("mend {name}"))?

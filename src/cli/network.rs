@@ -4,7 +4,7 @@ use super::failure::{Failure, OrFail};
 use super::files;
 use darn::mend::{Limits, Mender};
 use darn::net::{BackendKind, Network, Networks, Settings};
-use darn::serve::{Autodiff, Backend};
+use darn::serve::{Autodiff, Backend, NetworkArgs};
 use std::path::{Path, PathBuf};
 
 /// The weights that are used when none are named; the first are the default ones.
@@ -20,46 +20,14 @@ pub fn standard() -> &'static [u8] {
     SHIPPED[0].1
 }
 
-#[derive(Debug, clap::Args)]
-pub struct NetworkArgs {
-    /// Directory or file of the weights; left out, the shipped ones
-    #[arg(long, env = "DARN_WEIGHTS", value_name = "PATH")]
-    weights: Option<PathBuf>,
-    /// What runs the network
-    #[arg(
-        long,
-        env = "DARN_BACKEND",
-        value_name = "NAME",
-        default_value = "engine"
-    )]
-    backend: Backend,
-    /// What differentiates the network in the anchor search: the engine, or burn's autodiff on flex
-    #[arg(
-        long,
-        env = "DARN_AUTODIFF",
-        value_name = "NAME",
-        default_value = "engine"
-    )]
-    autodiff: Autodiff,
-}
-
-impl NetworkArgs {
-    /// Loads the networks these settings name.
-    pub fn mender(&self) -> Result<Mender, Failure> {
-        mender(
-            self.weights.as_deref(),
-            settings(self.backend, self.autodiff)?,
-        )
-    }
-}
-
-/// Loads the networks from `weights`, or the shipped ones.
+/// Loads the networks that were asked for, or the shipped ones.
 ///
 /// Of a directory, all files whose name ends in `.safetensors`: `standard.safetensors`, which must be there, is the default.
-pub fn mender(weights: Option<&Path>, settings: Settings) -> Result<Mender, Failure> {
+pub fn mender(args: &NetworkArgs) -> Result<Mender, Failure> {
+    let settings = settings(args.backend, args.autodiff)?;
     let load =
         |bytes: &[u8], name: &str| Network::load(bytes, settings).or_fail(format!("load {name}"));
-    let networks: Result<Vec<Network>, Failure> = match weights {
+    let networks: Result<Vec<Network>, Failure> = match &args.weights {
         None => (SHIPPED.iter())
             .map(|(name, bytes)| load(bytes, &format!("the shipped {name}")))
             .collect(),
@@ -96,7 +64,7 @@ fn in_directory(path: &Path) -> Result<Vec<PathBuf>, Failure> {
 }
 
 /// What runs and what differentiates.
-pub fn settings(backend: Backend, autodiff: Autodiff) -> Result<Settings, Failure> {
+fn settings(backend: Backend, autodiff: Autodiff) -> Result<Settings, Failure> {
     let name = match backend {
         Backend::Engine => "engine",
         Backend::Flex => "flex",

@@ -2,10 +2,11 @@
 
 use super::failure::{Failure, OrFail};
 use super::files;
-use super::network::NetworkArgs;
+use super::network::mender;
 use super::progress::Progress;
 use darn::contract::Search;
 use darn::scan::{Limits, Scan};
+use darn::serve::NetworkArgs;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -41,7 +42,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let bytes = files::read(&args.scan)?;
     let scan = Scan::read(&bytes, &Limits::default()).or_fail(format!("read {name}"))?;
     progress.stage("loading weights");
-    let mender = args.network.mender()?;
+    let mender = mender(&args.network)?;
     progress.stage("searching");
     let search = Search {
         hole: args.hole,

@@ -16,10 +16,7 @@ pub fn run(settings: &ServeArgs) -> Result<(), Failure> {
             .build_global())
         .or_fail("start threads")?;
     }
-    let mender = network::mender(
-        settings.weights.as_deref(),
-        network::settings(settings.backend, settings.autodiff)?,
-    )?;
+    let mender = network::mender(&settings.network)?;
     let limits = Limits {
         max_faces: settings.max_faces,
         ..Limits::default()

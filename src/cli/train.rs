@@ -69,8 +69,8 @@ pub struct Args {
     #[arg(long, value_name = "WEIGHT", value_parser = weight)]
     gamma: Option<f64>,
     /// What computes the steps: burn, or the engine, which is several times as fast but needs weights to start from
-    #[arg(long, default_value = "burn")]
-    trainer: Trainer,
+    #[arg(long, value_enum, default_value = "burn")]
+    trainer: Steps,
     /// Seed of weights and samples
     #[arg(long, default_value_t = TrainOptions::default().seed)]
     seed: u64,
@@ -120,6 +120,24 @@ impl Frame {
         match self {
             Self::Given => FrameKind::Given,
             Self::Canonical => FrameKind::Canonical,
+        }
+    }
+}
+
+/// What can compute the steps.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Steps {
+    /// burn, from random weights or given ones
+    Burn,
+    /// darn's own kernels
+    Engine,
+}
+
+impl Steps {
+    fn kind(self) -> Trainer {
+        match self {
+            Self::Burn => Trainer::Burn,
+            Self::Engine => Trainer::Engine,
         }
     }
 }
@@ -184,7 +202,7 @@ impl Args {
                 Start::Fresh
             },
             from: self.from.clone(),
-            trainer: self.trainer,
+            trainer: self.trainer.kind(),
             network: UnetConfig {
                 width: self.width,
                 input: self.input.kind(),

@@ -26,6 +26,11 @@ impl FrameKind {
         self != FrameKind::Canonical
     }
 
+    /// Whether a network of this frame is told where up is.
+    pub fn told_up(self) -> bool {
+        self == FrameKind::Hanging
+    }
+
     /// Whether the grid is turned before the network sees it.
     pub fn turns(self) -> bool {
         self != FrameKind::Given

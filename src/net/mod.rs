@@ -31,7 +31,8 @@ use crate::grid::{CELLS, NormalGrid, SIDE};
 
 pub use anchor::AnchorLoss;
 pub use convolve::Convolve;
-pub use fill::{InputKind, membrane, over, plate};
+pub(crate) use fill::over;
+pub use fill::{InputKind, plate};
 pub use frame::{Frame, FrameKind};
 pub use networks::Networks;
 pub use symmetry::Averaging;
@@ -328,7 +329,7 @@ fn base_of(config: &UnetConfig, grid: &NormalGrid) -> Option<Vec<[f32; 3]>> {
 
 /// Where up is in a frame, for a network that wants to know.
 fn up_of(config: &UnetConfig, frame: &Frame) -> Option<[f32; 3]> {
-    (config.frame == FrameKind::Hanging).then(|| frame.up())
+    config.frame.told_up().then(|| frame.up())
 }
 
 /// Grids of checked size turned to the network's frame, shown to it, its answer turned back.

@@ -5,6 +5,7 @@ use burn::tensor::backend::{AutodiffBackend, Backend};
 use burn::tensor::{Distribution, Tensor, TensorData, TensorPrimitive};
 use nalgebra::{Rotation3, Vector3};
 
+use super::fill::membrane;
 use super::weights::{NamedTensors, export, read, write};
 use super::*;
 use crate::grid::cell_centre;

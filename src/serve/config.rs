@@ -81,6 +81,26 @@ pub struct ServeArgs {
     )]
     pub allow_origin: Vec<String>,
 
+    #[command(flatten)]
+    pub network: NetworkArgs,
+
+    /// Which log lines are written, such as info or darn=debug
+    #[arg(long, env = "DARN_LOG", value_name = "FILTER", default_value = "info")]
+    pub log: String,
+
+    /// How log lines look
+    #[arg(
+        long,
+        env = "DARN_LOG_FORMAT",
+        value_name = "FORMAT",
+        default_value = "text"
+    )]
+    pub log_format: LogFormat,
+}
+
+/// Which weights, and what computes with them.
+#[derive(Debug, Clone, Args)]
+pub struct NetworkArgs {
     /// Directory or file of the weights; left out, the shipped ones
     #[arg(long, env = "DARN_WEIGHTS", value_name = "PATH")]
     pub weights: Option<PathBuf>,
@@ -102,19 +122,6 @@ pub struct ServeArgs {
         default_value = "engine"
     )]
     pub autodiff: Autodiff,
-
-    /// Which log lines are written, such as info or darn=debug
-    #[arg(long, env = "DARN_LOG", value_name = "FILTER", default_value = "info")]
-    pub log: String,
-
-    /// How log lines look
-    #[arg(
-        long,
-        env = "DARN_LOG_FORMAT",
-        value_name = "FORMAT",
-        default_value = "text"
-    )]
-    pub log_format: LogFormat,
 }
 
 /// What runs the network.

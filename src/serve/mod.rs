@@ -38,7 +38,7 @@ use tracing::{error, info};
 
 pub use self::{
     app::App,
-    config::{Autodiff, Backend, ServeArgs},
+    config::{Autodiff, Backend, NetworkArgs, ServeArgs},
     healthcheck::{HealthError, healthcheck},
     seam::{Class, Kept, Mended, Menders, PatchForm, Patches, Refusal},
     telemetry::{LogFormat, start_logging},

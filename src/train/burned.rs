@@ -123,7 +123,7 @@ fn sight<B: Backend>(batch: &Batch, frame: FrameKind) -> Sight<B> {
             &device,
         )
     };
-    let up = (frame == FrameKind::Hanging).then(|| batch.up.clone());
+    let up = frame.told_up().then(|| batch.up.clone());
     Sight {
         positions: tensor(&batch.positions, 3),
         known: tensor(&batch.known, 1),

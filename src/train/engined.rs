@@ -15,7 +15,7 @@ use super::{TrainError, TrainOptions};
 use crate::grid::{CELLS, SIDE};
 use crate::net::engine::{Engine, EngineError, Input, Lessons, Options, Scratch};
 use crate::net::weights::NamedTensors;
-use crate::net::{FrameKind, UnetConfig, cells};
+use crate::net::{UnetConfig, cells};
 
 type B = Autodiff<Flex>;
 
@@ -45,7 +45,7 @@ impl Engined {
             positions: &batch.positions,
             known: &batch.known,
             base: Some(&batch.base),
-            up: (self.config.frame == FrameKind::Hanging).then_some(&batch.up),
+            up: self.config.frame.told_up().then_some(&batch.up),
         }
     }
 

@@ -1,7 +1,5 @@
 //! Whoever takes a training step: burn with any backend, or darn's own engine. The loop does not know which.
 
-use std::str::FromStr;
-
 use burn::backend::Flex;
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
@@ -24,18 +22,6 @@ pub enum Trainer {
     Burn,
     /// darn's own kernels, several times as fast: batch norm keeps its statistics, so it starts from weights that burn has trained.
     Engine,
-}
-
-impl FromStr for Trainer {
-    type Err = String;
-
-    fn from_str(name: &str) -> Result<Trainer, String> {
-        match name {
-            "burn" => Ok(Trainer::Burn),
-            "engine" => Ok(Trainer::Engine),
-            _ => Err(format!("there is no trainer `{name}`: burn or engine")),
-        }
-    }
 }
 
 /// A run between two steps. The samples' generator needs no state: batch k follows from the seed and k.
