@@ -1,23 +1,19 @@
-//! Training steps by darn's own engine: its kernels for the network, burn's autodiff for the loss of what the network said. The loss's
-//! means are over the few grids that go through the kernels together, not over the batch.
+//! Training steps by darn's own engine: its kernels for the network, the loss's derivatives written out. The loss's means are over the few
+//! grids that go through the kernels together, not over the batch.
 
 use std::ops::Range;
 
-use burn::backend::{Autodiff, Flex};
-use burn::tensor::{Tensor, TensorData};
 use rayon::prelude::*;
 
 use super::batch::{Batch, Prepared};
-use super::loss::{LossWeights, Target, loss};
 use super::optimiser::{BETA1, BETA2, CLIP, DECAY, EPSILON, share_kept};
-use super::student::{Learned, Snapshot, Student, terms};
+use super::slopes::slopes;
+use super::student::{Learned, Snapshot, Student};
 use super::{TrainError, TrainOptions};
-use crate::grid::{CELLS, SIDE};
+use crate::grid::CELLS;
 use crate::net::engine::{Engine, EngineError, Input, Lessons, Options, Scratch};
 use crate::net::weights::NamedTensors;
 use crate::net::{UnetConfig, cells};
-
-type B = Autodiff<Flex>;
 
 /// A network by its tensors, with its optimiser.
 #[derive(Debug)]
@@ -130,17 +126,16 @@ impl Student for Engined {
         let engine = self.engine(&self.network)?;
         let input = self.input(&batch);
         let count = batch.count;
-        let mut terms = [0.0; 5];
-        let mut lesson = |grids: Range<usize>, predictions: &[f32], by: &mut [f32]| {
+        let lesson = |grids: Range<usize>, predictions: &[f32], by: &mut [f32]| {
             let share = grids.len() as f32 / count as f32;
-            let target = Target::of(batch.part(grids), &Default::default());
-            let said = slopes(predictions, &target, &options.loss, by);
+            let said = slopes(predictions, &batch.part(grids), &options.loss, by);
             by.iter_mut().for_each(|x| *x *= share);
-            let sums = terms.iter_mut().zip(said);
-            sums.for_each(|(sum, term)| *sum += term * share);
+            said.map(|term| term * share)
         };
         let lessons = &mut self.lessons;
-        let gradient = engine.learn(lessons, &self.network, input, &mut lesson)?;
+        let (gradient, said) = engine.learn(lessons, &self.network, input, &lesson)?;
+        let sum = |term: usize| said.iter().map(|terms| terms[term]).sum();
+        let terms = std::array::from_fn(sum);
         let norm = self.descend(&gradient, rate);
         self.average();
         Ok((terms, norm))
@@ -167,27 +162,4 @@ impl Student for Engined {
         engine.predict(&mut Scratch::default(), input, &mut out)?;
         Ok(out.chunks_exact(3 * CELLS).map(cells).collect())
     }
-}
-
-/// The loss of predictions `[n, 3, 64, 64]` and, in `by`, its derivatives with respect to them.
-fn slopes(
-    predictions: &[f32],
-    target: &Target<B>,
-    weights: &LossWeights,
-    by: &mut [f32],
-) -> [f32; 5] {
-    let shape = [predictions.len() / (3 * CELLS), 3, SIDE, SIDE];
-    let data = TensorData::new(predictions.to_vec(), shape);
-    let predicted = Tensor::<B, 4>::from_data(data, &Default::default()).require_grad();
-    let loss = loss(predicted.clone(), target, weights);
-    let terms = terms(&loss);
-    if let Some(slopes) = predicted.grad(&loss.total.backward()) {
-        let slopes: Vec<f32> = slopes
-            .into_data()
-            .convert::<f32>()
-            .into_vec()
-            .unwrap_or_default();
-        by.iter_mut().zip(slopes).for_each(|(by, x)| *by = x);
-    }
-    terms
 }

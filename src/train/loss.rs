@@ -13,11 +13,11 @@ use super::near::{REACH, near_pairs};
 use crate::grid::{CELLS, SIDE};
 
 /// Where the data term turns from quadratic to linear, in cells.
-const DATA_BEND: f32 = 1.0;
+pub(super) const DATA_BEND: f32 = 1.0;
 /// The same for differences of neighbours.
-const GRADIENT_BEND: f32 = 0.25;
+pub(super) const GRADIENT_BEND: f32 = 0.25;
 /// Guards the root of a length, in cells squared.
-const LENGTH_GUARD: f32 = 1e-4;
+pub(super) const LENGTH_GUARD: f32 = 1e-4;
 
 /// How an error becomes a loss.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

@@ -11,6 +11,7 @@ pub mod loss;
 mod near;
 pub mod optimiser;
 pub mod score;
+mod slopes;
 mod student;
 pub mod trainer;
 

@@ -24,8 +24,9 @@ pub struct Lessons {
 }
 
 /// A loss, given which grids of the call it is about and their predictions `[n, 3, 64, 64]`: fills in its derivatives with respect to
-/// them. Called for some grids at a time, on the caller's thread; what is learned is the sum.
-pub type Lesson<'a> = dyn FnMut(Range<usize>, &[f32], &mut [f32]) + 'a;
+/// them (zero at first), and says whatever it has to say. Called for some grids at a time, on a thread of the pool, where it must not wait
+/// for others; what is learned is the sum.
+pub type Lesson<'a, T> = dyn Fn(Range<usize>, &[f32], &mut [f32]) -> T + Sync + 'a;
 
 /// What [`TOGETHER`] grids need.
 #[derive(Debug)]
@@ -89,19 +90,20 @@ impl Lane {
 }
 
 impl Engine {
-    /// The gradient of a loss with respect to the weights, by their names; `tensors` are those that the engine was made from.
+    /// The gradient of a loss with respect to the weights, by their names, and what the lessons said, in the order of their grids; `tensors`
+    /// are those that the engine was made from.
     ///
     /// Statistics of batch norm (`mean`, `variance`) are taken as they are and have no gradient. The same on any number of threads.
     ///
     /// # Errors
     /// Slices whose lengths are not those of the same number of grids; tensors of another network.
-    pub fn learn(
+    pub fn learn<T: Send>(
         &self,
         lessons: &mut Lessons,
         tensors: &NamedTensors,
         input: Input,
-        lesson: &mut Lesson,
-    ) -> Result<NamedTensors, EngineError> {
+        lesson: &Lesson<T>,
+    ) -> Result<(NamedTensors, Vec<T>), EngineError> {
         input.check()?;
         let images = input.images();
         let lanes = images.div_ceil(TOGETHER);
@@ -111,30 +113,25 @@ impl Engine {
         lessons.predictions.resize(images * 3 * CELLS, 0.0);
         lessons.cotangents.resize(images * 3 * CELLS, 0.0);
         let size = TOGETHER * 3 * CELLS;
-        let of = |place: usize, values: &[f32]| {
-            place * TOGETHER..place * TOGETHER + values.len() / (3 * CELLS)
-        };
-        let parts = lessons.predictions.par_chunks_mut(size);
+        let parts =
+            (lessons.predictions.par_chunks_mut(size)).zip(lessons.cotangents.par_chunks_mut(size));
         let numbered = lessons.lanes.par_iter_mut().zip(parts).enumerate();
-        numbered.for_each(|(place, (lane, out))| {
-            lane.predict(self, input.part(of(place, out)), out);
-        });
-        // On this thread: a lesson may wait for locks, and a pool's thread that waits is given other work.
-        let parts = lessons.predictions.chunks(size);
-        let both = parts.zip(lessons.cotangents.chunks_mut(size));
-        for (place, (predictions, by)) in both.enumerate() {
+        let said = numbered.map(|(place, (lane, (out, by)))| {
+            let first = place * TOGETHER;
+            let grids = first..first + out.len() / (3 * CELLS);
+            lane.predict(self, input.part(grids.clone()), out);
             by.fill(0.0);
-            lesson(of(place, predictions), predictions, by);
-        }
-        let parts = lessons.cotangents.par_chunks(size);
-        let lanes_with = lessons.lanes.par_iter_mut().zip(parts);
-        lanes_with.for_each(|(lane, by)| lane.differentiate(self, by));
+            let said = lesson(grids, out, by);
+            lane.differentiate(self, by);
+            said
+        });
+        let said = said.collect();
         let (first, others) = lessons.lanes.split_at_mut(1);
         let sums = &mut first[0].sums;
         for other in others.iter().take(lanes.saturating_sub(1)) {
             sums.join(&other.sums);
         }
-        sums.folds().by_name(tensors)
+        Ok((sums.folds().by_name(tensors)?, said))
     }
 }
 

@@ -57,12 +57,9 @@ fn the_gradient_by_the_weights_is_the_difference_quotient() {
         for isa in targets() {
             let engine = engine(&tensors, config, isa, 1);
             let mut lessons = Lessons::default();
-            let mut given =
-                |_: Range<usize>, _: &[f32], to: &mut [f32]| to.copy_from_slice(&cotangent);
+            let given = |_: Range<usize>, _: &[f32], to: &mut [f32]| to.copy_from_slice(&cotangent);
             let input = input(&positions, &known);
-            let slopes = engine
-                .learn(&mut lessons, &tensors, input, &mut given)
-                .unwrap();
+            let (slopes, _) = engine.learn(&mut lessons, &tensors, input, &given).unwrap();
             let statistics = |name: &str| name.ends_with(".mean") || name.ends_with(".variance");
             let trained = tensors.keys().filter(|name| !statistics(name));
             assert!(trained.eq(slopes.keys()));
@@ -88,12 +85,13 @@ fn lessons_of_many_grids_are_the_sum_of_lessons_of_one() {
     let mut learn = |grids: Range<usize>| {
         let part = input(&positions, &known).part(grids.clone());
         let cotangent = &cotangent[grids.start * 3 * CELLS..grids.end * 3 * CELLS];
-        let mut given = |grids: Range<usize>, _: &[f32], to: &mut [f32]| {
+        let given = |grids: Range<usize>, _: &[f32], to: &mut [f32]| {
             to.copy_from_slice(&cotangent[grids.start * 3 * CELLS..grids.end * 3 * CELLS]);
         };
         engine
-            .learn(&mut lessons, &tensors, part, &mut given)
+            .learn(&mut lessons, &tensors, part, &given)
             .unwrap()
+            .0
     };
     let all = learn(0..6);
     let each: Vec<NamedTensors> = (0..6).map(|grid| learn(grid..grid + 1)).collect();
