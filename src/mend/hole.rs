@@ -15,6 +15,16 @@ use crate::patch::quality::{self, Quality};
 /// Largest stretch of an edge, of chart or patch, that goes without a note.
 const SUSPICIOUS: f64 = 1.5;
 
+/// A hole's new cloth, before anything is said about it.
+pub struct Filled<'h, 'c> {
+    /// The hole.
+    pub prepared: &'h Prepared,
+    /// The triangles.
+    pub patch: Patch,
+    wishes: Wishes<'c>,
+    timings: v1::HoleTimings,
+}
+
 /// A hole's new cloth and what is to be said about it.
 pub struct Made {
     /// The triangles.
@@ -26,13 +36,13 @@ pub struct Made {
 /// Fills a prepared hole.
 ///
 /// # Errors
-/// Constraints that do not fit the hole, hard anchors out of reach, and whatever keeps it from being meshed.
-pub fn make(
-    (prepared, cloth): (&Prepared, &Cloth),
-    chosen: &Chosen,
+/// Constraints that do not fit the hole, anchors out of reach, and whatever keeps it from being meshed.
+pub fn fill<'h: 'c, 'c>(
+    prepared: &'h Prepared,
+    chosen: &'c Chosen,
     inpainter: &Inpainter,
     limits: &Limits,
-) -> Result<Made, MendError> {
+) -> Result<Filled<'h, 'c>, MendError> {
     let unedited = prepared.unedited(inpainter, limits)?;
     let wishes = Wishes::of((prepared, &unedited), chosen, inpainter, limits)?;
     let mut timings = prepared.timings;
@@ -44,7 +54,7 @@ pub fn make(
         unedited.patch.clone()
     } else {
         let started = Instant::now();
-        let filled = fill::moved(
+        let moved = fill::moved(
             (prepared, &unedited),
             &wishes.moves(),
             inpainter,
@@ -52,10 +62,29 @@ pub fn make(
         )?;
         timings.net += milliseconds(started);
         let started = Instant::now();
-        let patch = prepared.patch(&filled, &pulls, limits)?;
+        let patch = prepared.patch(&moved, &pulls, limits)?;
         timings.patch += milliseconds(started);
         patch
     };
+    Ok(Filled {
+        prepared,
+        patch,
+        wishes,
+        timings,
+    })
+}
+
+/// Measures a filled hole and writes its report.
+///
+/// # Errors
+/// Hard anchors that were not met.
+pub fn described(filled: Filled, cloth: &Cloth) -> Result<Made, MendError> {
+    let Filled {
+        prepared,
+        patch,
+        wishes,
+        mut timings,
+    } = filled;
     let (anchors, edits) = wishes.kept(&patch)?;
 
     let started = Instant::now();

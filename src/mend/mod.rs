@@ -1,8 +1,9 @@
 //! The whole job as synchronous functions: read scan in, patched bytes and a report out. The only room that knows all stages.
 //! `cloth` finds the loops, `select` matches them to the request, `prepared` lays a hole flat, `wishes` and `fill` bring constraints to it,
-//! `hole` meshes it, `dress` turns its patch into glTF terms; `opened` is all of a scan's holes, kept by `session`, thrown away by [`mend`].
+//! `hole` meshes it, `beside` keeps it off other patches, `dress` turns its patch into glTF terms; `opened` is all of a scan's holes, kept by `session`, thrown away by [`mend`].
 //! No async, no I/O, no clocks but for the report's timings; the bytes depend on scan, constraints, weights and version alone.
 
+mod beside;
 mod cloth;
 mod dress;
 mod error;

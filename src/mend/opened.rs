@@ -4,8 +4,9 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
+use super::beside;
 use super::cloth::Cloth;
-use super::hole::{self, Made};
+use super::hole::{self, Filled, Made};
 use super::inpainter::Inpainter;
 use super::prepared::Prepared;
 use super::select::{Chosen, Selection, select};
@@ -120,7 +121,7 @@ impl Opened {
         let Selection { chosen, skipped } = select(scan, &self.cloth, &constraints)?;
         let inpainter = chosen_inpainter(&constraints, mender)?;
         let started = Instant::now();
-        let make = |chosen: &Chosen| {
+        let filled = chosen.par_iter().map(|chosen| {
             let prepared = self.hole(chosen.id).ok_or_else(|| {
                 let opened: Vec<String> = self.holes.iter().map(|h| h.id.to_string()).collect();
                 let detail = format!(
@@ -130,10 +131,15 @@ impl Opened {
                 );
                 MendError::Constraints(vec![FieldError::new("/holes", detail)])
             })?;
-            let made = hole::make((prepared, &self.cloth), chosen, &inpainter, &mender.limits)?;
-            Ok((prepared, made))
-        };
-        let holes: Vec<Result<_, MendError>> = chosen.par_iter().map(make).collect();
+            hole::fill(prepared, chosen, &inpainter, &mender.limits)
+        });
+        let filled: Vec<Result<_, MendError>> = filled.collect();
+        let mut filled: Vec<Filled> = filled.into_iter().collect::<Result<_, _>>()?;
+        beside::apart(&mut filled);
+        let filled = filled.into_par_iter();
+        let holes: Vec<Result<_, MendError>> = filled
+            .map(|filled| Ok((filled.prepared, hole::described(filled, &self.cloth)?)))
+            .collect();
         Ok(Patched {
             holes: holes.into_iter().collect::<Result<_, _>>()?,
             skipped,
@@ -153,13 +159,15 @@ impl Opened {
         mender: &Mender,
     ) -> Result<Mended, MendError> {
         let patched = self.patched(scan, constraints, mender)?;
+        let started = Instant::now();
         let additions = self.additions(scan, &patched)?;
+        let dressed_ms = milliseconds(started);
         let started = Instant::now();
         let bytes = scan.write(&additions)?;
         let mut report = self.report(scan, patched);
         if let Some(timings) = &mut report.timings {
             timings.write = milliseconds(started);
-            timings.total += timings.write;
+            timings.total += dressed_ms + timings.write;
         }
         Ok(Mended { bytes, report })
     }

@@ -83,6 +83,11 @@ impl Plan {
         self
     }
 
+    /// Pushes a finished patch off cloth that the plan does not know; what it knows stays kept off, too.
+    pub fn keep_off(&self, patch: &mut Patch, others: &TriMesh) {
+        self.surroundings.clone().among(others).separate(patch);
+    }
+
     /// All vertices in the plane of the chart, scene units; the rim's come first.
     pub fn flat(&self) -> &[Vec2] {
         &self.tiled.points

@@ -1,7 +1,8 @@
 //! What a request may ask of a scan, and what it is told.
 
-use darn::contract::{Anchor, Constraints, HoleSelector};
+use darn::contract::{Anchor, Constraints, Edit, Gesture, HoleSelector};
 use darn::mend::MendError;
+use darn::mesh::intersect::intersections_with;
 use darn::mesh::{TriMesh, Vec3};
 use darn::scarffolds::scanned::Hole;
 
@@ -213,4 +214,41 @@ fn a_tube_keeps_its_ends_and_loses_its_hole() {
     for p in after.invented() {
         assert!((p.x.hypot(p.z) - 1.0).abs() < 0.05, "{p:?}");
     }
+}
+
+#[test]
+fn patches_of_two_layers_are_kept_off_each_other() {
+    let lower = holed(&laid(|u, v| [u, v, 0.0]), &ROUND).mesh;
+    let mut both = lower.clone();
+    let base = both.positions.len() as u32;
+    let above = lower.positions.iter().map(|p| p + Vec3::z() * 0.01);
+    both.positions.extend(above);
+    both.faces
+        .extend(lower.faces.iter().map(|f| f.map(|v| v + base)));
+    let bytes = packed(&both, &[]);
+    let holes = mended(&bytes, &Constraints::default())
+        .unwrap()
+        .report
+        .holes;
+    // The lower layer's new cloth is drawn through the upper layer's.
+    let through = Constraints {
+        edits: vec![Edit {
+            hole: Some(holes[0].id),
+            gesture: Gesture::Grab {
+                uv: [0.5, 0.5],
+                offset: [0.0, 0.0, 0.03],
+            },
+        }],
+        ..Constraints::default()
+    };
+    let mended = mended(&bytes, &through).unwrap();
+    let seen = Seen::of(&mended.bytes);
+    let highest = seen.invented().iter().map(|p| p.z).fold(0.0, f64::max);
+    assert!(highest > 0.015, "the grab moved the cloth: {highest}");
+    let patch: Vec<u32> = seen.patch.iter().map(|f| *f as u32).collect();
+    let cuts = intersections_with(&seen.welded.mesh, &patch).len();
+    let told: u32 = (mended.report.holes.iter().flat_map(|h| &h.patch))
+        .map(|p| p.self_intersections)
+        .sum();
+    assert_eq!((cuts, told), (0, 0));
 }
