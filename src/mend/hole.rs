@@ -4,16 +4,19 @@ use std::time::Instant;
 
 use super::cloth::{Cloth, kind};
 use super::inpainter::Inpainter;
-use super::prepared::Prepared;
+use super::prepared::{Prepared, Unedited};
 use super::select::Chosen;
 use super::wishes::Wishes;
 use super::{Limits, MendError, fill, milliseconds};
 use crate::contract::v1;
-use crate::patch::Patch;
+use crate::mesh::Vec3;
 use crate::patch::quality::{self, Quality};
+use crate::patch::{self, Patch, Pull};
 
 /// Largest stretch of an edge, of chart or patch, that goes without a note.
 const SUSPICIOUS: f64 = 1.5;
+/// How often less and less of a move is tried before the pulls alone draw the cloth.
+const TRIES: usize = 2;
 
 /// A hole's new cloth, before anything is said about it.
 pub struct Filled<'h, 'c> {
@@ -62,7 +65,7 @@ pub fn fill<'h: 'c, 'c>(
         )?;
         timings.net += milliseconds(started);
         let started = Instant::now();
-        let patch = prepared.patch(&moved, &pulls, limits)?;
+        let patch = drawn((prepared, &unedited), &moved, &pulls, limits)?;
         timings.patch += milliseconds(started);
         patch
     };
@@ -72,6 +75,30 @@ pub fn fill<'h: 'c, 'c>(
         wishes,
         timings,
     })
+}
+
+/// The patch of moved cloth, of as much of its move as the cloth can bear: what the network answers to far wishes is itself stretched.
+fn drawn(
+    (prepared, unedited): (&Prepared, &Unedited),
+    moved: &[Vec3],
+    pulls: &[Pull],
+    limits: &Limits,
+) -> Result<Patch, MendError> {
+    let stretch = |patch: &Patch| quality::measure(patch, &prepared.region).stretch_max;
+    let usual = stretch(&unedited.patch);
+    let most = patch::bearable(usual);
+    let mut share = 1.0;
+    for _ in 0..TRIES {
+        let each = unedited.filled.iter().zip(moved);
+        let filled: Vec<Vec3> = each.map(|(from, to)| from.lerp(to, share)).collect();
+        let patch = prepared.patch(&filled, pulls, limits)?;
+        let found = stretch(&patch);
+        if found <= most {
+            return Ok(patch);
+        }
+        share *= (most - usual) / (found - usual);
+    }
+    prepared.patch(&unedited.filled, pulls, limits)
 }
 
 /// Measures a filled hole and writes its report.

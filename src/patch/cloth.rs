@@ -34,9 +34,9 @@ impl Default for Elastics {
     fn default() -> Self {
         Elastics {
             strain: 0.002,
-            bending: 0.12,
+            bending: 0.2,
             rest_curvature: 1.0,
-            tether: 45.0,
+            tether: 30.0,
             rounds: 300,
             still: 1e-3,
         }

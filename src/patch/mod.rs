@@ -20,7 +20,7 @@ mod triangulate;
 mod untangle;
 
 pub use cloth::Elastics;
-pub use plan::{Plan, plan};
+pub use plan::{Plan, bearable, plan};
 pub use pull::{Hold, Pull};
 pub use triangulate::signed_area;
 

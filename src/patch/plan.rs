@@ -13,6 +13,7 @@ use crate::flatten::Chart;
 use crate::grid;
 use crate::mesh::region::Region;
 use crate::mesh::{TriMesh, Vec2, Vec3};
+pub use touch::bearable;
 
 /// Everything about a patch that does not depend on what fills the hole; owned, so that a session can keep it.
 pub struct Plan {

@@ -158,16 +158,14 @@ fn a_patch_meets_the_rim_where_it_really_lies_and_keeps_off_other_cloth_there() 
     let mut noisy = region.clone();
     noisy.mesh = shaken(&region.mesh, 0.002, 1);
     noisy.mesh.positions.iter_mut().for_each(|p| *p += up);
-    // Slightly tilted, through the middle of where the patch comes to lie, clear of where it would lie without the shift.
+    // Below where the patch comes to lie but for a bump, and above where it would lie without the shift.
     let centre = free.positions[middle] + up;
-    let layer = sheet(
-        4,
-        |_, _| true,
-        |u, v| {
-            let (x, y) = (0.1 * (u - 0.5), 0.1 * (v - 0.5));
-            centre + Vec3::new(x, y, 0.1 * x)
-        },
-    );
+    let bumpy = |u: f64, v: f64| {
+        let (x, y) = (0.16 * (u - 0.5), 0.16 * (v - 0.5));
+        let bump = (-0.5 * (x * x + y * y) / 0.03f64.powi(2)).exp();
+        centre + Vec3::new(x, y, 0.028 * bump - 0.02)
+    };
+    let layer = sheet(16, |_, _| true, bumpy);
     let layer = weld(&layer).mesh;
     let cuts = |patch: &Patch| {
         let mut all = quality::joined(patch, &noisy);

@@ -159,7 +159,13 @@ fn an_absurd_anchor_neither_tears_nor_explodes() {
         let asked = anchored(vec![cloth.anchor(vertex, by)]);
         let (positions, report) = cloth.session.positions(&asked).unwrap();
         let hole = &report.holes[0];
-        assert!(hole.patch.as_ref().unwrap().stretch_max < 1.5, "sheet {k}");
+        let stretch = hole.patch.as_ref().unwrap().stretch_max;
+        let (_, free) = cloth.session.positions(&Constraints::default()).unwrap();
+        let usual = free.holes[0].patch.as_ref().unwrap().stretch_max;
+        assert!(
+            stretch <= 1.25f64.max(1.05 * usual) + 1e-6,
+            "sheet {k}: {stretch}, {usual} without it"
+        );
         assert!(hole.anchors[0].distance > 8.0 * cloth.extent);
         assert!(hole.anchors[0].beyond_reach > 8.0 * cloth.extent);
         assert!(hole.notes.iter().any(|n| n.starts_with("anchor 0")));

@@ -10,7 +10,7 @@ use crate::patch::pull::{Grip, Pull, Pulls};
 
 /// Radius of a finger, in cells: on less it draws pimples, which reach their stretch sooner and lie farther from the target.
 const FINGER: f64 = 3.0;
-/// Pulls may stretch an edge this much, ...
+/// A user's wishes may stretch an edge this much, ...
 const STRETCH: f64 = 1.25;
 /// ... or this much more than it is stretched without them.
 const MORE: f64 = 1.05;
@@ -18,6 +18,11 @@ const MORE: f64 = 1.05;
 const EASINGS: usize = 8;
 /// Most rounds of strain limiting under one length of pulls.
 const ROUNDS: usize = 60;
+
+/// The largest stretch that wishes may leave an edge with, given the largest one without them.
+pub fn bearable(before: f64) -> f64 {
+    STRETCH.max(MORE * before)
+}
 
 impl Plan {
     /// Draws the cloth, at rest where it lies, to where the pulls want it, as far as its strain allows; the rounds.
@@ -34,7 +39,7 @@ impl Plan {
         }
         let unpulled = positions.to_vec();
         let before = self.stretch(&unpulled);
-        let bound = STRETCH.max(MORE * before);
+        let bound = bearable(before);
         let drawn = fabric.at_rest(positions);
         self.lift(positions, grips)?;
         // Cloth that is pulled creeps on for long, by less than can be seen.
