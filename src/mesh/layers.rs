@@ -1,6 +1,6 @@
 //! Other layers of cloth about a hole: what a patch must not cut, though it is no part of the hole's region.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
 use super::region::Region;
 use super::{TriMesh, Vec3};
@@ -17,23 +17,14 @@ pub fn layers_near(whole: &TriMesh, region: &Region, beyond: f64) -> TriMesh {
     let on_rim: HashSet<u32> = (region.rim.iter())
         .map(|v| region.vertices[*v as usize])
         .collect();
-    let mut index = HashMap::new();
-    let mut near = TriMesh::default();
-    for (face, own) in whole.faces.iter().zip(own) {
+    let near = |(face, own): &(&[u32; 3], bool)| {
         let [a, b, c] = face.map(|v| whole.positions[v as usize]);
         let (least, most) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));
         let apart = (0..3).any(|k| most[k] < low[k] || least[k] > high[k]);
-        if own || apart || face.iter().any(|v| on_rim.contains(v)) {
-            continue;
-        }
-        near.faces.push(face.map(|v| {
-            *index.entry(v).or_insert_with(|| {
-                near.positions.push(whole.positions[v as usize]);
-                near.positions.len() as u32 - 1
-            })
-        }));
-    }
-    near
+        !own && !apart && !face.iter().any(|v| on_rim.contains(v))
+    };
+    let faces = whole.faces.iter().zip(own).filter(near);
+    whole.part(faces.map(|(face, _)| *face))
 }
 
 #[cfg(test)]

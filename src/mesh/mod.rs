@@ -19,6 +19,8 @@ pub mod weld;
 #[cfg(test)]
 pub(crate) mod shapes;
 
+use std::collections::HashMap;
+
 /// A point or direction in the plane of a chart.
 pub type Vec2 = nalgebra::Vector2<f64>;
 /// A point or direction in scene space.
@@ -40,6 +42,21 @@ impl TriMesh {
     /// When `face` or one of its vertices does not exist; welded meshes and regions keep both in range.
     pub fn triangle(&self, face: usize) -> [Vec3; 3] {
         self.faces[face].map(|v| self.positions[v as usize])
+    }
+
+    /// The mesh of some of its faces, with the vertices they use, in the order of first use.
+    pub fn part(&self, faces: impl IntoIterator<Item = [u32; 3]>) -> TriMesh {
+        let mut index = HashMap::new();
+        let mut part = TriMesh::default();
+        for face in faces {
+            part.faces.push(face.map(|v| {
+                *index.entry(v).or_insert_with(|| {
+                    part.positions.push(self.positions[v as usize]);
+                    part.positions.len() as u32 - 1
+                })
+            }));
+        }
+        part
     }
 
     /// The interior angle at `corner` (0..3) of a face, radians in `[0, π]`; 0 for a corner with a zero-length side.

@@ -1,8 +1,6 @@
 //! Which triangles of a patch cut each other or the cloth around: a sweep along one axis, floating-point rejection with margins, and
 //! the exact predicates of `mesh::intersect` on the few pairs that are left.
 
-use std::collections::HashMap;
-
 use crate::mesh::intersect::intersections_with;
 use crate::mesh::{TriMesh, Vec3};
 
@@ -16,16 +14,7 @@ pub(super) fn crossings(mesh: &TriMesh, first: usize) -> Vec<(u32, u32)> {
     let mut faces: Vec<u32> = doubtful.iter().flat_map(|(f, g)| [*f, *g]).collect();
     faces.sort_unstable();
     faces.dedup();
-    let mut index = HashMap::new();
-    let mut few = TriMesh::default();
-    for f in &faces {
-        few.faces.push(mesh.faces[*f as usize].map(|v| {
-            *index.entry(v).or_insert_with(|| {
-                few.positions.push(mesh.positions[v as usize]);
-                few.positions.len() as u32 - 1
-            })
-        }));
-    }
+    let few = mesh.part(faces.iter().map(|f| mesh.faces[*f as usize]));
     let asked: Vec<u32> = (0u32..)
         .zip(&faces)
         .filter(|(_, f)| **f as usize >= first)
