@@ -2,8 +2,8 @@
 //!
 //! The level is what vertices stand off from a cubic through the two rings around them; folds are cubics at that scale, noise is not.
 //! Noise is taken off by a smoothing spline over the mesh: every vertex gives way to the bending energy of all of them, the more the
-//! noisier the scan is. Where neighbours are far apart along the surface, that moves them towards each other, too: noise along the surface
-//! folds triangles over, and laid flat each of them asks for its area twice.
+//! noisier the scan is. That evens vertices along the surface, too, where noise folds triangles over: laid flat, each of those would ask
+//! for its area twice.
 
 use nalgebra::{SMatrix, SVector};
 

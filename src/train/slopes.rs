@@ -1,5 +1,5 @@
-//! The loss of [`super::loss`] and its derivatives with respect to a prediction, written out on plain slices: what burn's autodiff gives, in
-//! a thirtieth of its time. For the trainer that has no tensors.
+//! The loss of [`super::loss`] and its derivatives with respect to a prediction, written out on plain slices: what burn's autodiff gives,
+//! for the trainer that has no tensors. It takes no locks, so that it may run on the pool's threads.
 
 use super::batch::Batch;
 use super::loss::{DATA_BEND, GRADIENT_BEND, LENGTH_GUARD, LossKind, LossWeights};
@@ -31,7 +31,7 @@ pub fn slopes(
             add(&mut slope[cell], by, weight * of_cell);
         }
         // What follows sees the error in the hole alone: known cells keep the scan's positions.
-        let mut composed = vec![[0.0; 3]; CELLS];
+        let mut by_composed = vec![[0.0; 3]; CELLS];
         let along_u = grid.pairs_u.iter().enumerate().map(|(k, weight)| {
             let cell = k / (SIDE - 1) * SIDE + k % (SIDE - 1);
             ([cell, cell + 1], weight * of_u)
@@ -51,16 +51,16 @@ pub fn slopes(
             stretch += (long - wanted).powi(2) * weight;
             let by_stretch = 2.0 * (long - wanted) / long * weight * weights.stretch as f32;
             for (cell, sign) in [(b, 1.0), (a, -1.0)] {
-                add(&mut composed[cell], by, sign * by_gradient);
-                add(&mut composed[cell], step, sign * by_stretch);
+                add(&mut by_composed[cell], by, sign * by_gradient);
+                add(&mut by_composed[cell], step, sign * by_stretch);
             }
         }
         if weights.self_penetration > 0.0 {
             let weight = weights.self_penetration as f32 / holes;
-            repulsion += grid.repelled(weight, &mut composed) / holes;
+            repulsion += grid.repelled(weight, &mut by_composed) / holes;
         }
         for (cell, slope) in slope.iter_mut().enumerate() {
-            add(slope, composed[cell], grid.hole[cell]);
+            add(slope, by_composed[cell], grid.hole[cell]);
             for (axis, x) in slope.iter().enumerate() {
                 by[(3 * number + axis) * CELLS + cell] = x * SIDE as f32;
             }
