@@ -39,7 +39,7 @@ pub struct Made {
 /// Fills a prepared hole.
 ///
 /// # Errors
-/// Constraints that do not fit the hole, anchors out of reach, and whatever keeps it from being meshed.
+/// Constraints that do not fit the hole, hard anchors out of reach, and whatever keeps it from being meshed.
 pub fn fill<'h: 'c, 'c>(
     prepared: &'h Prepared,
     chosen: &'c Chosen,
