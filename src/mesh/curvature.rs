@@ -105,7 +105,7 @@ pub fn mean_dihedral(mesh: &TriMesh, topology: &Topology) -> f64 {
     sum / f64::max(count, 1.0)
 }
 
-fn doubled_normal(mesh: &TriMesh, face: usize) -> Vec3 {
+pub(super) fn doubled_normal(mesh: &TriMesh, face: usize) -> Vec3 {
     let [a, b, c] = mesh.triangle(face);
     (b - a).cross(&(c - a))
 }

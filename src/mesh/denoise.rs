@@ -7,6 +7,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use super::curvature::doubled_normal;
 use super::topology::corners_by_vertex;
 use super::{TriMesh, Vec3};
 use crate::cholesky::Symmetric;
@@ -104,7 +105,7 @@ impl Around {
     /// The normal at a vertex, weighted by area.
     fn normal(&self, mesh: &TriMesh, vertex: u32) -> Option<Vec3> {
         let faces = self.faces_at(vertex);
-        let sum: Vec3 = faces.map(|f| doubled_normal(mesh, f)).sum();
+        let sum: Vec3 = faces.map(|f| doubled_normal(mesh, f as usize)).sum();
         sum.try_normalize(0.0)
     }
 
@@ -180,11 +181,6 @@ fn stand_off(mesh: &TriMesh, around: &Around, vertex: u32) -> Option<f64> {
     off.is_finite().then_some(off.abs())
 }
 
-fn doubled_normal(mesh: &TriMesh, face: u32) -> Vec3 {
-    let [a, b, c] = mesh.triangle(face as usize);
-    (b - a).cross(&(c - a))
-}
-
 /// Mean length of the faces' sides, scene units.
 fn mean_edge(mesh: &TriMesh) -> f64 {
     let sides = (0..mesh.faces.len()).map(|f| {
@@ -220,7 +216,7 @@ mod tests {
 
     /// Faces that are turned away from the sheet's upper side.
     fn folded_over(mesh: &TriMesh) -> usize {
-        let down = |f: &u32| doubled_normal(mesh, *f).z < 0.0;
+        let down = |f: &u32| doubled_normal(mesh, *f as usize).z < 0.0;
         (0..mesh.faces.len() as u32).filter(down).count()
     }
 
