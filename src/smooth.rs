@@ -4,7 +4,7 @@
 
 use serde::Serialize;
 
-use crate::cholesky::{NotPositive, Symmetric};
+use crate::cholesky::Symmetric;
 use crate::grid::{CELLS, SIDE, neighbour_pairs};
 use crate::mesh::Vec3;
 
@@ -56,13 +56,23 @@ pub fn smooth(
     hole: &[bool],
     energy: Smooth,
 ) -> Option<Vec<Vec3>> {
+    smooth_all(&[positions], known, hole, energy)?.pop()
+}
+
+/// [`smooth`] for several sheets of which the same cells are known: the factor, which is most of the work, is theirs together.
+pub fn smooth_all(
+    sheets: &[&[Vec3]],
+    known: &[bool],
+    hole: &[bool],
+    energy: Smooth,
+) -> Option<Vec<Vec<Vec3>>> {
     let mut unknown = vec![usize::MAX; CELLS];
     let open: Vec<usize> = (0..CELLS).filter(|&k| hole[k]).collect();
     for (place, &cell) in open.iter().enumerate() {
         unknown[cell] = place;
     }
     let mut system = Symmetric::zero(open.len());
-    let mut rhs = vec![[0.0; 3]; open.len()];
+    let mut rhs = vec![vec![[0.0; 3]; open.len()]; sheets.len()];
     let present = |k: usize| hole[k] || known[k];
     let mut free = Vec::with_capacity(4);
     let mut add = |difference: Difference| {
@@ -72,18 +82,15 @@ pub fn smooth(
             return;
         }
         free.clear();
-        let mut constant = Vec3::zeros();
-        for &(k, c) in terms {
-            if hole[k] {
-                free.push((unknown[k], c));
-            } else {
-                constant += positions[k] * c;
-            }
-        }
+        let fixed = || terms.iter().filter(|(k, _)| !hole[*k]);
+        free.extend((terms.iter().filter(|(k, _)| hole[*k])).map(|&(k, c)| (unknown[k], c)));
         system.add_square(&free, difference.weight);
-        for &(place, c) in &free {
-            for axis in 0..3 {
-                rhs[place][axis] -= difference.weight * c * constant[axis];
+        for (positions, rhs) in sheets.iter().zip(&mut rhs) {
+            let constant: Vec3 = fixed().map(|&(k, c)| positions[k] * c).sum();
+            for &(place, c) in &free {
+                for axis in 0..3 {
+                    rhs[place][axis] -= difference.weight * c * constant[axis];
+                }
             }
         }
     };
@@ -100,19 +107,20 @@ pub fn smooth(
             .map(|(a, b)| Difference::new(tension, [(a, -1.0), (b, 1.0)]))
             .for_each(add);
     }
-    solved(&system, &mut rhs).ok()?;
-    let mut filled = positions.to_vec();
-    for (&cell, p) in open.iter().zip(&rhs) {
-        filled[cell] = Vec3::from(*p);
+    if !open.is_empty() {
+        let factor = system.factor().ok()?;
+        for rhs in &mut rhs {
+            factor.solve(rhs).ok()?;
+        }
     }
-    Some(filled)
-}
-
-fn solved(system: &Symmetric, rhs: &mut [[f64; 3]]) -> Result<(), NotPositive> {
-    if rhs.is_empty() {
-        return Ok(());
-    }
-    system.factor()?.solve(rhs)
+    let filled = sheets.iter().zip(rhs).map(|(positions, rhs)| {
+        let mut filled = positions.to_vec();
+        for (&cell, p) in open.iter().zip(&rhs) {
+            filled[cell] = Vec3::from(*p);
+        }
+        filled
+    });
+    Some(filled.collect())
 }
 
 /// The second differences whose least cell is `k`: along u, along v, and mixed.
@@ -163,5 +171,17 @@ mod tests {
         assert!(taut < 0.3 * membrane, "{taut} {membrane}");
         let wave = |u: f64, v: f64| Vec3::new(u, v, 0.1 * (6.0 * u).sin() * (5.0 * v).cos());
         assert!(worst(wave, Smooth::TautPlate) < 0.5 * worst(wave, Smooth::Membrane));
+    }
+
+    #[test]
+    fn sheets_are_filled_together_as_each_is_alone() {
+        let (wave, known) = holed(|u, v| Vec3::new(u, v, 0.1 * (6.0 * u).sin() * (5.0 * v).cos()));
+        let (bent, _) = holed(|u, v| Vec3::new(v, u, (u - 0.5).powi(2)));
+        let hole: Vec<bool> = known.iter().map(|k| !k).collect();
+        let both = smooth_all(&[&wave, &bent], &known, &hole, Smooth::TautPlate).unwrap();
+        for (together, sheet) in both.iter().zip([&wave, &bent]) {
+            let alone = smooth(sheet, &known, &hole, Smooth::TautPlate).unwrap();
+            assert_eq!(*together, alone);
+        }
     }
 }

@@ -136,3 +136,26 @@ fn wrong_usage_is_64_and_a_broken_scan_is_1_with_one_line_that_says_why() {
     let said = String::from_utf8_lossy(&missing.stderr).into_owned();
     assert!(said.contains("/nowhere/scan.glb"), "{said}");
 }
+
+#[test]
+fn samples_are_records_of_bytes_the_same_for_the_same_seed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let sheets = folder.path().to_str().expect("a name");
+    let made = darn()
+        .args(["scarffolds", "--count", "1", "--out", sheets])
+        .output();
+    assert!(made.expect("darn runs").status.success());
+    let samples = |seed: &str| {
+        let told = [
+            "samples", "--sheets", sheets, "--count", "3", "--alike", "2",
+        ];
+        let found = darn().args(told).args(["--seed", seed]).output();
+        found.expect("darn runs").stdout
+    };
+    let first = samples("4");
+    // Two grids of 3 × 4096 numbers, where up is, a byte of flags a cell.
+    assert_eq!(first.len(), 3 * ((2 * 3 * 4096 + 3) * 4 + 4096));
+    assert!(first == samples("4") && first != samples("5"));
+    let missing = darn().args(["samples", "--sheets", "/nowhere"]).output();
+    assert_eq!(missing.expect("darn runs").status.code(), Some(1));
+}

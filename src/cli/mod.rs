@@ -16,6 +16,7 @@ mod openapi;
 mod optimize_anchor;
 mod progress;
 mod render;
+mod samples;
 mod scarffolds;
 mod serve;
 mod train;
@@ -53,6 +54,8 @@ enum Command {
     Healthcheck(healthcheck::Args),
     /// Simulate sheets of cloth to train on
     Scarffolds(scarffolds::Args),
+    /// Write samples to learn from to standard output, for a trainer outside this program
+    Samples(samples::Args),
     /// Train a network on simulated sheets
     Train(train::Args),
     /// Measure a network's fills on held-out sheets
@@ -98,6 +101,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Render(args) => render::run(&args),
         Command::Healthcheck(args) => healthcheck::run(&args),
         Command::Scarffolds(args) => scarffolds::run(&args),
+        Command::Samples(args) => samples::run(&args),
         Command::Train(args) => train::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Bench(args) => bench::run(&args),

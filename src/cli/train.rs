@@ -38,6 +38,9 @@ pub struct Args {
     /// Sheets drawn for a sample to learn from, of which the roughest is taken: most sheets are gentle
     #[arg(long, value_name = "N", default_value_t = TrainOptions::default().roughest_of)]
     roughest_of: usize,
+    /// Samples to learn from that share a hole: the plate under it, most of the work of making them, is factored once
+    #[arg(long, value_name = "N", default_value_t = TrainOptions::default().alike)]
+    alike: usize,
     /// Highest learning rate
     #[arg(long, default_value_t = TrainOptions::default().rate)]
     rate: f64,
@@ -131,6 +134,9 @@ enum Steps {
     Burn,
     /// darn's own kernels
     Engine,
+    /// burn on an NVIDIA GPU, from random weights or given ones
+    #[cfg(feature = "cuda")]
+    Cuda,
 }
 
 impl Steps {
@@ -138,6 +144,8 @@ impl Steps {
         match self {
             Self::Burn => Trainer::Burn,
             Self::Engine => Trainer::Engine,
+            #[cfg(feature = "cuda")]
+            Self::Cuda => Trainer::Cuda,
         }
     }
 }
@@ -217,6 +225,7 @@ impl Args {
             loss: self.weights(),
             batch: self.batch,
             roughest_of: self.roughest_of,
+            alike: self.alike,
             rate: self.rate,
             minutes: self.minutes,
             every: self.every,

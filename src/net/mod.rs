@@ -32,7 +32,7 @@ use crate::grid::{CELLS, NormalGrid, SIDE};
 pub use anchor::AnchorLoss;
 pub use convolve::Convolve;
 pub(crate) use fill::over;
-pub use fill::{InputKind, plate};
+pub use fill::{InputKind, plate, plates};
 pub use frame::{Frame, FrameKind};
 pub use networks::Networks;
 pub use symmetry::Averaging;

@@ -79,28 +79,68 @@ impl Sampler {
         self.splines.len()
     }
 
-    /// Draws a sample from any sheet.
-    pub fn sample(&self, rng: &mut impl Rng) -> Sample {
+    /// Draws `count` samples from any sheets, all with the same cells valid, known and missing: what depends on those alone, as the plate's
+    /// factor, needs to be made once.
+    pub fn alike(&self, count: usize, rng: &mut impl Rng) -> Vec<Sample> {
+        let sheets: Vec<usize> = (0..count).map(|_| self.roughest(rng)).collect();
+        let cut = Cut::draw(rng);
+        let samples = sheets.into_iter().map(|sheet| {
+            let mut sample = self.taken(sheet, &cut, rng);
+            if rng.random_bool(NOISY.0) {
+                add_noise(&mut sample.truth, &sample.known, rng);
+            }
+            sample
+        });
+        samples.collect()
+    }
+
+    /// The roughest of some sheets.
+    fn roughest(&self, rng: &mut impl Rng) -> usize {
         let drawn = (0..self.candidates).map(|_| rng.random_range(0..self.splines.len()));
-        let drawn: Vec<usize> = drawn.collect();
-        let roughest = drawn
-            .iter()
-            .max_by(|a, b| self.roughness[**a].total_cmp(&self.roughness[**b]));
-        self.sample_of(roughest.copied().unwrap_or(0), rng)
+        drawn
+            .max_by(|a, b| self.roughness[*a].total_cmp(&self.roughness[*b]))
+            .unwrap_or(0)
     }
 
-    /// Draws a sample from sheet number `sheet`: for held-out sets in which every sheet has its turn.
-    pub fn sample_of(&self, sheet: usize, rng: &mut impl Rng) -> Sample {
-        let (_, mut sample) = self.clean_sample_of(sheet, rng);
-        if rng.random_bool(NOISY.0) {
-            add_noise(&mut sample.truth, &sample.known, rng);
-        }
-        sample
-    }
-
-    /// [`Sampler::sample_of`] without noise, and the shape of its hole: for measuring.
+    /// Draws a sample from sheet number `sheet` without noise, and the shape of its hole: for measuring sets in which every sheet has its turn.
     pub fn clean_sample_of(&self, sheet: usize, rng: &mut impl Rng) -> (Shape, Sample) {
+        let cut = Cut::draw(rng);
+        let sample = self.taken(sheet, &cut, rng);
+        (cut.shape, sample)
+    }
+
+    /// What a cut takes from a sheet.
+    fn taken(&self, sheet: usize, cut: &Cut, rng: &mut impl Rng) -> Sample {
         let spline = &self.splines[sheet];
+        let cells = cut.places.iter().zip(&cut.valid);
+        let positions: Vec<Vector3<f32>> = cells
+            .map(|(place, valid)| match valid {
+                true => spline.at(*place),
+                false => Vector3::zeros(),
+            })
+            .collect();
+        let turn = turn(self.turning, rng);
+        Sample {
+            truth: normalised(&positions, &cut.valid, &cut.known, &turn),
+            valid: cut.valid.clone(),
+            known: cut.known.clone(),
+            hole: cut.hole.clone(),
+        }
+    }
+}
+
+/// A square of a sheet with a hole in it, whatever the sheet; lists are `CELLS` long.
+struct Cut {
+    shape: Shape,
+    /// Where cells lie on the sheet.
+    places: Vec<[f32; 2]>,
+    valid: Vec<bool>,
+    known: Vec<bool>,
+    hole: Vec<bool>,
+}
+
+impl Cut {
+    fn draw(rng: &mut impl Rng) -> Self {
         let banded = rng.random_bool(BANDED);
         let (shape, hole) = masks::draw_kind(rng);
         let hole = if banded { centred(&hole, rng) } else { hole };
@@ -116,23 +156,13 @@ impl Sampler {
         let known: Vec<bool> = (0..CELLS)
             .map(|k| valid[k] && !hole[k] && away[k] <= reach[k])
             .collect();
-        let positions: Vec<Vector3<f32>> = (0..CELLS)
-            .map(|k| {
-                if valid[k] {
-                    spline.at(places[k])
-                } else {
-                    Vector3::zeros()
-                }
-            })
-            .collect();
-        let truth = normalised(&positions, &valid, &known, &turn(self.turning, rng));
-        let sample = Sample {
-            truth,
+        Self {
+            shape,
+            places,
             valid,
             known,
             hole,
-        };
-        (shape, sample)
+        }
     }
 }
 

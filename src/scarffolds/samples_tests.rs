@@ -24,7 +24,7 @@ proptest! {
     #[test]
     fn a_sample_is_in_the_networks_units(seed: u64, radius in 0.15f32..2.0) {
         let sampler = Sampler::new(&[rolled(radius)], Turning::Any);
-        let sample = sampler.sample(&mut ChaCha8Rng::seed_from_u64(seed));
+        let sample = sampler.alike(1, &mut ChaCha8Rng::seed_from_u64(seed)).remove(0);
         let known: Vec<usize> = (0..CELLS).filter(|&k| sample.known[k]).collect();
         prop_assert!(known.len() > 150, "{} known cells", known.len());
         for axis in 0..3 {
@@ -45,7 +45,7 @@ proptest! {
     #[test]
     fn every_rim_lies_on_the_sheet(seed: u64) {
         let sampler = Sampler::new(&[rolled(1.0)], Turning::Any);
-        let sample = sampler.sample(&mut ChaCha8Rng::seed_from_u64(seed));
+        let sample = sampler.alike(1, &mut ChaCha8Rng::seed_from_u64(seed)).remove(0);
         let away = masks::distance(&sample.hole);
         for k in (0..CELLS).filter(|&k| away[k] > 0.0 && away[k] < 1.5) {
             prop_assert!(sample.known[k]);
@@ -73,8 +73,22 @@ fn upright_samples_keep_their_height_order() {
 }
 
 #[test]
+fn samples_alike_share_their_cells_and_nothing_else() {
+    let sampler = Sampler::new(&[rolled(0.5), rolled(0.2)], Turning::Any);
+    let samples = sampler.alike(3, &mut ChaCha8Rng::seed_from_u64(12));
+    let [first, others @ ..] = &samples[..] else {
+        panic!("three were asked for")
+    };
+    for sample in others {
+        let cells = |s: &Sample| (s.valid.clone(), s.known.clone(), s.hole.clone());
+        assert_eq!(cells(sample), cells(first));
+        assert_ne!(sample.truth, first.truth);
+    }
+}
+
+#[test]
 fn the_same_seed_draws_the_same_sample() {
     let sampler = Sampler::new(&[rolled(0.5), rolled(0.2)], Turning::Any);
-    let draw = || sampler.sample(&mut ChaCha8Rng::seed_from_u64(11));
+    let draw = || sampler.alike(3, &mut ChaCha8Rng::seed_from_u64(11));
     assert_eq!(draw(), draw());
 }

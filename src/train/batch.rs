@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::grid::{CELLS, NormalGrid, SIDE, neighbour_pairs};
 use crate::net::symmetry::origins;
-use crate::net::{Frame, InputKind, UnetConfig, plate};
+use crate::net::{Frame, InputKind, UnetConfig, plates};
 use crate::scarffolds::samples::Sample;
 
 /// Share of samples whose known cells are noisy.
@@ -74,13 +74,22 @@ pub struct Batch {
 /// Brings a sample to the network's units and frame without changing it otherwise; `None` when too little is known.
 pub fn prepare(sample: &Sample, network: &UnetConfig) -> Option<Prepared> {
     let still = vec![[0.0; 3]; CELLS];
-    prepare_noisy(sample, (&sample.known, &still), network)
+    let prepared = prepare_noisy(sample, &still, network)?;
+    with_bases(vec![prepared], &sample.known, network).pop()
 }
 
-/// A random variant of a sample: one of the grid's 8 symmetries, perhaps mirrored, noisy or with anchors.
-pub fn augment(sample: &Sample, network: &UnetConfig, rng: &mut ChaCha8Rng) -> Option<Prepared> {
-    let mut sample = symmetric(sample, rng.random_range(0..8));
-    let scanned = sample.known.clone();
+/// Random variants of samples of which the same cells are known: one of the grid's 8 symmetries for all, each perhaps mirrored, noisy or with
+/// anchors. Those of which too little is known are left out.
+pub fn augment(samples: &[Sample], network: &UnetConfig, rng: &mut ChaCha8Rng) -> Vec<Prepared> {
+    let symmetry = rng.random_range(0..8);
+    let samples: Vec<Sample> = samples.iter().map(|s| symmetric(s, symmetry)).collect();
+    let scanned = samples.first().map(|s| s.known.clone());
+    let prepared = samples.into_iter().filter_map(|s| vary(s, network, rng));
+    with_bases(prepared.collect(), &scanned.unwrap_or_default(), network)
+}
+
+/// The sample perhaps mirrored, noisy or with anchors.
+fn vary(mut sample: Sample, network: &UnetConfig, rng: &mut ChaCha8Rng) -> Option<Prepared> {
     if network.frame.turns() && rng.random() {
         sample.truth.iter_mut().for_each(|p| p[0] = -p[0]);
     }
@@ -101,15 +110,28 @@ pub fn augment(sample: &Sample, network: &UnetConfig, rng: &mut ChaCha8Rng) -> O
     let noise: Vec<[f32; 3]> = (0..CELLS)
         .map(|_| [(); 3].map(|()| gaussian(rng) * sigma))
         .collect();
-    prepare_noisy(&sample, (&scanned, &noise), network)
+    prepare_noisy(&sample, &noise, network)
 }
 
-/// `scanned` cells are known without anchors; `noise` is in cells.
-fn prepare_noisy(
-    sample: &Sample,
-    (scanned, noise): (&[bool], &[[f32; 3]]),
-    network: &UnetConfig,
-) -> Option<Prepared> {
+/// Gives grids the base that the network wants; the `scanned` cells are known in all of them, without anchors.
+fn with_bases(mut samples: Vec<Prepared>, scanned: &[bool], network: &UnetConfig) -> Vec<Prepared> {
+    if network.input != InputKind::Plate {
+        return samples;
+    }
+    let grids: Vec<&[[f32; 3]]> = (samples.iter())
+        .map(|s| s.input.positions.as_slice())
+        .collect();
+    let Some(bases) = plates(&grids, scanned) else {
+        return Vec::new();
+    };
+    for (sample, base) in samples.iter_mut().zip(bases) {
+        sample.input.base = Some(base);
+    }
+    samples
+}
+
+/// A sample without its base; `noise` is in cells.
+fn prepare_noisy(sample: &Sample, noise: &[[f32; 3]], network: &UnetConfig) -> Option<Prepared> {
     let point = |k: usize| Vector3::from(sample.truth[k]);
     let known = |k: &usize| sample.known[*k];
     let count = (0..CELLS).filter(known).count();
@@ -150,9 +172,6 @@ fn prepare_noisy(
         .positions
         .iter_mut()
         .for_each(|p| *p = frame.enter(*p));
-    if network.input == InputKind::Plate {
-        input.base = Some(plate(&input.positions, scanned)?);
-    }
     let truth = (0..CELLS)
         .map(|k| {
             if sample.valid[k] {
@@ -257,11 +276,14 @@ impl Batch {
     }
 }
 
+/// Draws samples of which the same cells are known, one at least.
+pub type Source = Arc<dyn Fn(&mut ChaCha8Rng) -> Vec<Sample> + Send + Sync>;
+
 /// What batches are made of.
 #[derive(Clone)]
 pub struct Recipe {
-    /// Draws a sample.
-    pub source: Arc<dyn Fn(&mut ChaCha8Rng) -> Sample + Send + Sync>,
+    /// Draws samples.
+    pub source: Source,
     /// The network that they are for.
     pub network: UnetConfig,
     /// Samples in a batch.
@@ -275,11 +297,17 @@ impl Recipe {
     pub fn batch(&self, index: u64) -> Batch {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(index + 1);
+        Batch::of(&self.samples(&mut rng))
+    }
+
+    /// A batch's samples.
+    pub fn samples(&self, rng: &mut ChaCha8Rng) -> Vec<Prepared> {
         let mut samples = Vec::with_capacity(self.size);
         while samples.len() < self.size {
-            samples.extend(augment(&(self.source)(&mut rng), &self.network, &mut rng));
+            samples.extend(augment(&(self.source)(rng), &self.network, rng));
         }
-        Batch::of(&samples)
+        samples.truncate(self.size);
+        samples
     }
 }
 

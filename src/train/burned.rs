@@ -7,8 +7,8 @@ use burn::tensor::{Tensor, TensorData};
 
 use super::batch::{Batch, Prepared};
 use super::loss::{Target, loss};
-use super::optimiser::{AdamW, average};
-use super::student::{Learned, Snapshot, Student, terms};
+use super::optimiser::{AdamW, average, flat, with_values};
+use super::student::{Learned, Snapshot, Student, numbers, terms};
 use super::{TrainError, TrainOptions};
 use crate::grid::{CELLS, SIDE};
 use crate::net::weights::{self, export};
@@ -19,7 +19,8 @@ use crate::net::{Convolve, FrameKind, InputKind, Sight, Unet, UnetConfig, cells,
 pub struct Burned<B: AutodiffBackend> {
     config: UnetConfig,
     network: Unet<B>,
-    averaged: Unet<B::InnerBackend>,
+    /// The values of the averaged network, end to end.
+    averaged: Tensor<B::InnerBackend, 1>,
     optimiser: AdamW<B::InnerBackend>,
 }
 
@@ -31,19 +32,18 @@ where
         let config = options.network;
         let device = B::Device::default();
         let inner = Default::default();
-        let flat = |values: Vec<f32>| {
+        let tensor = |values: Vec<f32>| {
             let n = values.len();
             Tensor::<B::InnerBackend, 1>::from_data(TensorData::new(values, [n]), &inner)
         };
+        let averaged = weights::build::<B::InnerBackend>(&config, &snapshot.averaged, &inner)?;
         Ok(Burned {
             config,
             network: weights::build::<B>(&config, &snapshot.network, &device)?,
-            averaged: weights::build::<B::InnerBackend>(&config, &snapshot.averaged, &inner)?,
+            averaged: flat(&averaged),
             optimiser: AdamW {
                 step: snapshot.step,
-                moments: (snapshot.moments.into_iter())
-                    .map(|pair| pair.map(flat))
-                    .collect(),
+                moments: (snapshot.moments.into_iter().next()).map(|pair| pair.map(tensor)),
             },
         })
     }
@@ -78,14 +78,16 @@ where
             InputKind::Membrane | InputKind::Plate => added + filled,
         };
         let loss = loss(predicted, &Target::of(batch, &device), &options.loss);
-        let terms = terms(&loss);
+        let terms = terms(&loss).inner();
         let gradients = GradientsParams::from_grads(loss.total.backward(), &self.network);
         let network = self.network.clone();
-        let (network, norm) = self.optimiser.step::<B, _>(network, gradients, rate);
-        self.network = network;
+        let (network, norm) = self.optimiser.step::<B, _>(network, &gradients, rate);
         let averaged = self.averaged.clone();
-        self.averaged = average(averaged, &self.network.valid(), self.optimiser.step);
-        Ok((terms, norm))
+        self.averaged = average(averaged, flat(&network.valid()), self.optimiser.step);
+        self.network = network;
+        // The one place where a step waits for its device.
+        let [terms @ .., norm] = numbers::<_, 6>(Tensor::cat(vec![terms, norm], 0));
+        Ok((terms, norm.into()))
     }
 
     fn steps(&self) -> u64 {
@@ -93,24 +95,31 @@ where
     }
 
     fn snapshot(&self) -> Snapshot {
-        let flat = |x: &Tensor<B::InnerBackend, 1>| {
+        let values = |x: &Tensor<B::InnerBackend, 1>| {
             let data = x.to_data().convert::<f32>();
             data.into_vec().unwrap_or_default()
         };
         let moments = self.optimiser.moments.iter();
         Snapshot {
             network: export(&self.network.valid()),
-            averaged: export(&self.averaged),
-            moments: moments.map(|pair| pair.each_ref().map(flat)).collect(),
+            averaged: export(&self.averaged()),
+            moments: moments.map(|pair| pair.each_ref().map(values)).collect(),
             step: self.optimiser.step,
         }
     }
 
     fn predictions(&self, samples: &[Prepared]) -> Result<Vec<Vec<[f32; 3]>>, TrainError> {
+        let averaged = self.averaged();
         Ok(answers(samples, |batch| {
             let sight = sight::<B::InnerBackend>(batch, self.config.frame);
-            self.averaged.predict(self.config.input, sight)
+            averaged.predict(self.config.input, sight)
         }))
+    }
+}
+
+impl<B: AutodiffBackend> Burned<B> {
+    fn averaged(&self) -> Unet<B::InnerBackend> {
+        with_values(self.network.valid(), self.averaged.clone())
     }
 }
 

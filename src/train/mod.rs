@@ -10,6 +10,7 @@ mod engined;
 pub mod loss;
 mod near;
 pub mod optimiser;
+pub mod record;
 pub mod score;
 mod slopes;
 mod student;
@@ -21,6 +22,8 @@ mod tests;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+#[cfg(feature = "cuda")]
+use burn::backend::Cuda;
 use burn::backend::{Autodiff, Flex};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -102,6 +105,9 @@ pub struct TrainOptions {
     /// Sheets drawn for a sample to learn from, of which the roughest is taken.
     #[serde(default = "one")]
     pub roughest_of: usize,
+    /// Samples to learn from that share a hole, and so the plate's factor, which is most of the work of making them.
+    #[serde(default = "one")]
+    pub alike: usize,
     /// Highest learning rate.
     pub rate: f64,
     /// How long; the learning rate falls to zero at the end.
@@ -143,6 +149,7 @@ impl Default for TrainOptions {
             loss: LossWeights::default(),
             batch: 16,
             roughest_of: 1,
+            alike: 1,
             rate: 1e-3,
             minutes: 60.0,
             every: 5.0,
@@ -152,7 +159,7 @@ impl Default for TrainOptions {
     }
 }
 
-/// Trains on the CPU (burn-flex, or the engine) with the sheets in `options.sheets`, reporting after every step.
+/// Trains by the trainer in `options` with the sheets in `options.sheets`, reporting after every step.
 ///
 /// # Errors
 /// Unreadable sheets or checkpoint, files that cannot be written, a loss that is not finite.
@@ -164,27 +171,33 @@ pub fn run(
         true => Turning::Upright,
         false => Turning::Any,
     };
-    let train = sampler(&options.sheets, turning, options.roughest_of)?;
-    let held = sampler(&options.held_out, turning, 1)?;
-    let mut rng = ChaCha8Rng::seed_from_u64(HELD_OUT_SEED);
-    let held_out = (0..HELD_OUT_SAMPLES).map(|_| held(&mut rng)).collect();
+    let train = sampler(&options.sheets, turning)?.roughest_of(options.roughest_of);
+    let held_out = held_out(&sampler(&options.held_out, turning)?);
+    let alike = options.alike.max(1);
     let data_seed = scarffolds::sheets::read_manifest(&options.sheets)
         .ok()
         .map(|manifest| manifest.seed);
     let sources = Sources {
-        train,
+        train: Arc::new(move |rng| train.alike(alike, rng)),
         held_out,
         data_seed,
     };
     match options.trainer {
         Trainer::Burn => trainer::train::<Burned<Autodiff<Flex>>>(options, sources, progress),
         Trainer::Engine => trainer::train::<Engined>(options, sources, progress),
+        #[cfg(feature = "cuda")]
+        Trainer::Cuda => trainer::train::<Burned<Autodiff<Cuda>>>(options, sources, progress),
     }
 }
 
-type Source = Arc<dyn Fn(&mut ChaCha8Rng) -> Sample + Send + Sync>;
+/// The samples that scores are measured on: always the same of the same sheets.
+pub fn held_out(sheets: &Sampler) -> Vec<Sample> {
+    let mut rng = ChaCha8Rng::seed_from_u64(HELD_OUT_SEED);
+    let samples = (0..HELD_OUT_SAMPLES).flat_map(|_| sheets.alike(1, &mut rng));
+    samples.collect()
+}
 
-fn sampler(dir: &Path, turning: Turning, roughest_of: usize) -> Result<Source, TrainError> {
+fn sampler(dir: &Path, turning: Turning) -> Result<Sampler, TrainError> {
     let refuse = |reason: String| TrainError::Sheets {
         path: dir.to_owned(),
         reason,
@@ -193,6 +206,5 @@ fn sampler(dir: &Path, turning: Turning, roughest_of: usize) -> Result<Source, T
     if sheets.is_empty() {
         return Err(refuse("there are none".into()));
     }
-    let sampler = Sampler::new(&sheets, turning).roughest_of(roughest_of);
-    Ok(Arc::new(move |rng| sampler.sample(rng)))
+    Ok(Sampler::new(&sheets, turning))
 }

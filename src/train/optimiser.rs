@@ -2,7 +2,10 @@
 //! an exponential average of the weights. burn's own clips each tensor by itself and keys its state by ids that a checkpoint would
 //! have to carry.
 
-use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
+use std::collections::VecDeque;
+use std::ops::Range;
+
+use burn::module::{Module, ModuleMapper, ModuleVisitor, Param, ParamId};
 use burn::optim::GradientsParams;
 use burn::tensor::Tensor;
 use burn::tensor::backend::{AutodiffBackend, Backend};
@@ -17,112 +20,110 @@ pub const CLIP: f64 = 1.0;
 /// The average's memory never exceeds this many steps' share.
 const AVERAGE: f64 = 0.998;
 
-/// The optimiser's state: first and second moments of every trained parameter, flat, in the module's order.
+/// The optimiser's state. All trained parameters lie end to end in one tensor, in the module's order: on a GPU a step is a few large
+/// kernels instead of a thousand small ones.
 #[derive(Debug, Clone)]
 pub struct AdamW<B: Backend> {
     /// Steps taken.
     pub step: u64,
-    /// First and second moment of each parameter.
-    pub moments: Vec<[Tensor<B, 1>; 2]>,
+    /// First and second moment, once there is a step.
+    pub moments: Option<[Tensor<B, 1>; 2]>,
 }
 
 impl<B: Backend> Default for AdamW<B> {
     fn default() -> Self {
         AdamW {
             step: 0,
-            moments: Vec::new(),
+            moments: None,
         }
     }
 }
 
 impl<I: Backend> AdamW<I> {
-    /// One step down the gradients; returns the module and the gradient's norm before clipping.
-    pub fn step<B, M>(&mut self, module: M, gradients: GradientsParams, rate: f64) -> (M, f64)
+    /// One step down the gradients; returns the module and the gradient's norm before clipping, `[1]`, which nothing has waited for.
+    pub fn step<B, M>(
+        &mut self,
+        module: M,
+        gradients: &GradientsParams,
+        rate: f64,
+    ) -> (M, Tensor<I, 1>)
     where
         B: AutodiffBackend<InnerBackend = I>,
         M: Module<B>,
     {
         self.step += 1;
-        let mut norm = Norm {
-            gradients: &gradients,
-            squares: 0.0,
-            marker: std::marker::PhantomData::<I>,
-        };
-        module.visit(&mut norm);
-        let norm = norm.squares.sqrt();
-        let clip = if norm > CLIP { CLIP / norm } else { 1.0 };
-        let mut update = Update {
+        let mut trained = Trained::<I> {
             gradients,
-            moments: &mut self.moments,
-            index: 0,
-            step: self.step,
-            rate,
-            clip,
+            decay: 1.0 - rate * DECAY,
+            places: VecDeque::new(),
+            values: Vec::new(),
+            slopes: Vec::new(),
+        };
+        module.visit(&mut trained);
+        let values = Tensor::cat(trained.values, 0);
+        let gradient = Tensor::cat(trained.slopes, 0);
+        let norm = gradient.clone().mul(gradient.clone()).sum().sqrt();
+        let clip = (norm.clone().recip() * CLIP).clamp_max(1.0);
+        let gradient = gradient.clone().mul(clip.expand(gradient.shape()));
+        let zeros = || [gradient.zeros_like(), gradient.zeros_like()];
+        let [first, second] = self.moments.take().unwrap_or_else(zeros);
+        let first = first * BETA1 + gradient.clone() * (1.0 - BETA1);
+        let second = second * BETA2 + gradient.clone().mul(gradient) * (1.0 - BETA2);
+        let unbias = |beta: f64| 1.0 / (1.0 - beta.powi(self.step as i32));
+        let (scale1, scale2) = (unbias(BETA1) * rate, unbias(BETA2));
+        let change = (first.clone() * scale1).div((second.clone() * scale2).sqrt() + EPSILON);
+        self.moments = Some([first, second]);
+        let mut update = Update {
+            values: values - change,
+            places: trained.places,
         };
         (module.map(&mut update), norm)
     }
 }
 
-struct Norm<'a, I> {
+/// The parameters that have a gradient, decayed, and their gradients.
+struct Trained<'a, I: Backend> {
     gradients: &'a GradientsParams,
-    squares: f64,
-    marker: std::marker::PhantomData<I>,
+    /// What is left of a kernel; vectors are left as they are.
+    decay: f64,
+    places: VecDeque<(ParamId, Range<usize>)>,
+    values: Vec<Tensor<I, 1>>,
+    slopes: Vec<Tensor<I, 1>>,
 }
 
-impl<B: AutodiffBackend> ModuleVisitor<B> for Norm<'_, B::InnerBackend> {
+impl<B: AutodiffBackend> ModuleVisitor<B> for Trained<'_, B::InnerBackend> {
     fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<B, D>>) {
-        if let Some(gradient) = self.gradients.get::<B::InnerBackend, D>(param.id) {
-            let squares = gradient
-                .clone()
-                .mul(gradient)
-                .sum()
-                .into_data()
-                .convert::<f64>();
-            self.squares += squares.iter::<f64>().sum::<f64>();
-        }
+        let Some(slope) = self.gradients.get::<B::InnerBackend, D>(param.id) else {
+            return;
+        };
+        let n = slope.shape().num_elements();
+        let start = self.places.back().map_or(0, |(_, range)| range.end);
+        self.places.push_back((param.id, start..start + n));
+        let value = param.val().inner().reshape([n]);
+        let kernel = D > 1;
+        let value = if kernel { value * self.decay } else { value };
+        self.values.push(value);
+        self.slopes.push(slope.reshape([n]));
     }
 }
 
-struct Update<'a, I: Backend> {
-    gradients: GradientsParams,
-    moments: &'a mut Vec<[Tensor<I, 1>; 2]>,
-    index: usize,
-    step: u64,
-    rate: f64,
-    clip: f64,
+/// Puts values end to end back to where they belong.
+struct Update<I: Backend> {
+    values: Tensor<I, 1>,
+    places: VecDeque<(ParamId, Range<usize>)>,
 }
 
-impl<B: AutodiffBackend> ModuleMapper<B> for Update<'_, B::InnerBackend> {
+impl<B: AutodiffBackend> ModuleMapper<B> for Update<B::InnerBackend> {
     fn map_float<const D: usize>(&mut self, param: Param<Tensor<B, D>>) -> Param<Tensor<B, D>> {
         let (id, tensor, mapper) = param.consume();
-        let Some(gradient) = self.gradients.remove::<B::InnerBackend, D>(id) else {
-            return Param::from_mapped_value(id, tensor, mapper);
-        };
-        let shape = tensor.shape();
-        let n = shape.num_elements();
-        let gradient = gradient.reshape([n]) * self.clip;
-        let value = tensor.inner().reshape([n]);
-        let zeros = || [value.zeros_like(), value.zeros_like()];
-        let [first, second] = self.moments.get(self.index).cloned().unwrap_or_else(zeros);
-        let first = first * BETA1 + gradient.clone() * (1.0 - BETA1);
-        let second = second * BETA2 + gradient.clone().mul(gradient) * (1.0 - BETA2);
-        let time = self.step as i32;
-        let (scale1, scale2) = (
-            1.0 / (1.0 - BETA1.powi(time)),
-            1.0 / (1.0 - BETA2.powi(time)),
-        );
-        let change =
-            (first.clone() * (scale1 * self.rate)).div((second.clone() * scale2).sqrt() + EPSILON);
-        let decay = if D > 1 { 1.0 - self.rate * DECAY } else { 1.0 };
-        let value = value * decay - change;
-        if let Some(slot) = self.moments.get_mut(self.index) {
-            *slot = [first, second];
-        } else {
-            self.moments.push([first, second]);
+        match self.places.pop_front_if(|(first, _)| *first == id) {
+            None => Param::from_mapped_value(id, tensor, mapper),
+            Some((_, range)) => {
+                let value = self.values.clone().slice(range).reshape(tensor.shape());
+                let value = Tensor::<B, D>::from_inner(value).require_grad();
+                Param::from_mapped_value(id, value, mapper)
+            }
         }
-        self.index += 1;
-        let value = Tensor::<B, D>::from_inner(value.reshape(shape)).require_grad();
-        Param::from_mapped_value(id, value, mapper)
     }
 }
 
@@ -131,15 +132,26 @@ pub fn share_kept(step: u64) -> f64 {
     AVERAGE.min((1.0 + step as f64) / (10.0 + step as f64))
 }
 
-/// Moves the averaged module towards the current one, running statistics included; `step` counts from 1.
-pub fn average<B: Backend, M: Module<B>>(averaged: M, current: &M, step: u64) -> M {
-    let keep = share_kept(step);
+/// All values of a module end to end, running statistics included.
+pub fn flat<B: Backend, M: Module<B>>(module: &M) -> Tensor<B, 1> {
     let mut collect = Collect { values: Vec::new() };
-    current.visit(&mut collect);
-    averaged.map(&mut Average {
-        values: collect.values.into_iter(),
-        keep,
-    })
+    module.visit(&mut collect);
+    Tensor::cat(collect.values, 0)
+}
+
+/// The module with the values of [`flat`].
+pub fn with_values<B: Backend, M: Module<B>>(module: M, values: Tensor<B, 1>) -> M {
+    module.map(&mut Place { values, next: 0 })
+}
+
+/// The average of a module's [`flat`] values moved towards the current ones; `step` counts from 1.
+pub fn average<B: Backend>(
+    averaged: Tensor<B, 1>,
+    current: Tensor<B, 1>,
+    step: u64,
+) -> Tensor<B, 1> {
+    let keep = share_kept(step);
+    averaged * keep + current * (1.0 - keep)
 }
 
 struct Collect<B: Backend> {
@@ -154,21 +166,18 @@ impl<B: Backend> ModuleVisitor<B> for Collect<B> {
     }
 }
 
-struct Average<B: Backend> {
-    values: std::vec::IntoIter<Tensor<B, 1>>,
-    keep: f64,
+struct Place<B: Backend> {
+    values: Tensor<B, 1>,
+    next: usize,
 }
 
-impl<B: Backend> ModuleMapper<B> for Average<B> {
+impl<B: Backend> ModuleMapper<B> for Place<B> {
     fn map_float<const D: usize>(&mut self, param: Param<Tensor<B, D>>) -> Param<Tensor<B, D>> {
         let (id, tensor, mapper) = param.consume();
-        let tensor = match self.values.next() {
-            Some(value) => {
-                let shape = tensor.shape();
-                tensor * self.keep + value.reshape(shape) * (1.0 - self.keep)
-            }
-            None => tensor,
-        };
-        Param::from_mapped_value(id, tensor, mapper)
+        let shape = tensor.shape();
+        let end = self.next + shape.num_elements();
+        let value = self.values.clone().slice(self.next..end);
+        self.next = end;
+        Param::from_mapped_value(id, value.reshape(shape), mapper)
     }
 }

@@ -20,6 +20,9 @@ pub enum Trainer {
     /// burn: batch norm with the statistics of each batch; from random weights or given ones.
     #[default]
     Burn,
+    /// burn on an NVIDIA GPU.
+    #[cfg(feature = "cuda")]
+    Cuda,
     /// darn's own kernels, several times as fast: batch norm keeps its statistics, so it starts from weights that burn has trained.
     Engine,
 }
@@ -31,7 +34,7 @@ pub struct Snapshot {
     pub network: NamedTensors,
     /// Its average over the last steps, which is what ships.
     pub averaged: NamedTensors,
-    /// The optimiser's first and second moments, one pair a trained tensor, in the student's own order.
+    /// The optimiser's first and second moments, in the student's own layout.
     pub moments: Vec<[Vec<f32>; 2]>,
     /// Steps taken.
     pub step: u64,
@@ -153,18 +156,21 @@ fn see(tensors: &mut NamedTensors, [before, after]: [usize; 2]) {
     shape[1] = after;
 }
 
-/// A loss's numbers.
-pub fn terms<B: Backend>(loss: &Loss<B>) -> [f32; 5] {
-    let number = |x: &Tensor<B, 1>| {
-        let data = x.to_data().convert::<f32>();
-        data.iter::<f32>().next().unwrap_or(f32::NAN)
-    };
-    [
+/// The loss and its terms, `[5]`.
+pub fn terms<B: Backend>(loss: &Loss<B>) -> Tensor<B, 1> {
+    let terms = [
         &loss.total,
         &loss.data,
         &loss.gradient,
         &loss.stretch,
         &loss.self_penetration,
-    ]
-    .map(number)
+    ];
+    Tensor::cat(terms.map(Tensor::clone).to_vec(), 0)
+}
+
+/// The numbers of a tensor `[N]`; NaN where there are fewer.
+pub fn numbers<B: Backend, const N: usize>(x: Tensor<B, 1>) -> [f32; N] {
+    let data = x.into_data().convert::<f32>();
+    let mut numbers = data.iter::<f32>();
+    std::array::from_fn(|_| numbers.next().unwrap_or(f32::NAN))
 }

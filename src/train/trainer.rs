@@ -2,13 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::Instant;
 
 use burn::backend::Flex;
-use rand_chacha::ChaCha8Rng;
 
-use super::batch::{Ahead, Prepared, Recipe, prepare};
+use super::batch::{Ahead, Prepared, Recipe, Source, prepare};
 use super::burned::input_fill;
 use super::checkpoint::{self, replace};
 use super::curves::Curves;
@@ -25,8 +23,8 @@ const LAST_RATE: f64 = 0.01;
 
 /// Where samples come from.
 pub struct Sources {
-    /// Draws a sample to learn from.
-    pub train: Arc<dyn Fn(&mut ChaCha8Rng) -> Sample + Send + Sync>,
+    /// Draws samples to learn from.
+    pub train: Source,
     /// Samples to be measured on.
     pub held_out: Vec<Sample>,
     /// Seed of the sheets behind `train`, for the model card.

@@ -86,6 +86,16 @@ impl Default for Options {
     }
 }
 
+/// One grid's base with what is known laid over it: [`crate::net::over`] on planes `[3, 64, 64]` and a mask `[64, 64]`.
+pub fn over(base: &[f32], positions: &[f32], known: &[f32]) -> Vec<f32> {
+    let off: Vec<f32> = positions.iter().zip(base).map(|(p, b)| p - b).collect();
+    let mut filled = vec![0.0; base.len()];
+    let mut pyramid = membrane::Pyramid::default();
+    membrane::membrane(Target::best(), &mut pyramid, (&off, known), &mut filled);
+    filled.iter_mut().zip(base).for_each(|(x, b)| *x += b);
+    filled
+}
+
 /// A network, ready to be asked; shared between threads, each with a [`Scratch`] of its own.
 #[derive(Debug)]
 pub struct Engine {

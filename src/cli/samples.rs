@@ -1,0 +1,96 @@
+//! `darn samples`: what a trainer outside this program learns from, as records on standard output.
+
+use super::failure::{Failure, OrFail};
+use darn::net::{FrameKind, UnetConfig};
+use darn::scarffolds::samples::{Sampler, Turning};
+use darn::scarffolds::sheets;
+use darn::train::batch::{Recipe, prepare};
+use darn::train::{self, record};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use std::io::{ErrorKind, IsTerminal, Write};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Samples written at once.
+const TOGETHER: usize = 64;
+
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Folder of sheets to learn from, as `darn scarffolds` makes it
+    #[arg(long)]
+    sheets: PathBuf,
+    /// How many samples; left out, as many as are read
+    #[arg(long)]
+    count: Option<usize>,
+    /// The same seed gives the same samples
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Sheets drawn for a sample, of which the roughest is taken: most sheets are gentle
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    roughest_of: usize,
+    /// Samples that share a hole: the plate under it, most of the work of making them, is factored once
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    alike: usize,
+    /// Keep up up instead of turning every sample anyhow
+    #[arg(long)]
+    upright: bool,
+    /// Write the samples that `darn train` measures its scores on, and no others
+    #[arg(long, conflicts_with_all = ["count", "seed", "roughest_of", "alike"])]
+    held_out: bool,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    if out.is_terminal() {
+        return Err(Failure::Usage(
+            "records are bytes: send standard output to a file or a program".into(),
+        ));
+    }
+    let sheets = sheets::read(&args.sheets).or_fail("read the sheets")?;
+    if sheets.is_empty() {
+        return Err(Failure::Usage(format!(
+            "there are no sheets in {}",
+            args.sheets.display()
+        )));
+    }
+    let (turning, frame) = match args.upright {
+        true => (Turning::Upright, FrameKind::Hanging),
+        false => (Turning::Any, FrameKind::Canonical),
+    };
+    let network = UnetConfig {
+        frame,
+        ..UnetConfig::default()
+    };
+    let (sampler, alike) = (Sampler::new(&sheets, turning), args.alike.max(1));
+    if args.held_out {
+        let samples = train::held_out(&sampler);
+        let samples = samples.iter().filter_map(|s| prepare(s, &network));
+        let mut records = Vec::new();
+        record::write(&samples.collect::<Vec<_>>(), &mut records);
+        return out.write_all(&records).or_fail("write samples");
+    }
+    let sampler = sampler.roughest_of(args.roughest_of);
+    let recipe = Recipe {
+        source: Arc::new(move |rng| sampler.alike(alike, rng)),
+        network,
+        size: TOGETHER,
+        seed: args.seed,
+    };
+    let mut rng = ChaCha8Rng::seed_from_u64(args.seed);
+    let mut left = args.count.unwrap_or(usize::MAX);
+    let mut records = Vec::with_capacity(TOGETHER * record::RECORD);
+    while left > 0 {
+        let mut samples = recipe.samples(&mut rng);
+        samples.truncate(left);
+        left -= samples.len();
+        records.clear();
+        record::write(&samples, &mut records);
+        match out.write_all(&records) {
+            // Whoever reads has enough.
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => return Ok(()),
+            written => written.or_fail("write samples")?,
+        }
+    }
+    Ok(())
+}
