@@ -35,8 +35,8 @@ impl Default for Elastics {
         Elastics {
             strain: 0.002,
             bending: 0.2,
-            rest_curvature: 1.0,
-            tether: 30.0,
+            rest_curvature: 0.7,
+            tether: 10.0,
             rounds: 300,
             still: 1e-3,
         }
