@@ -12,8 +12,8 @@ use super::topology::corners_by_vertex;
 use super::{TriMesh, Vec3};
 use crate::cholesky::Symmetric;
 
-/// Level, in mean edges, below which a mesh counts as clean. Cloth without noise reads 0.00 to 0.05, crumpled or not.
-const CLEAN: f64 = 0.06;
+/// Level, in mean edges, below which a mesh counts as clean. Cloth without noise reads 0.00 to 0.05, one in twenty, all crumpled, 0.1.
+const CLEAN: f64 = 0.07;
 /// Weight of the bending energy at a level of one edge; it grows with the level's square, as the noise's own energy does.
 const STIFFNESS: f64 = 40.0;
 /// The same along a border: a ragged one is no noise.
@@ -22,8 +22,8 @@ const BORDER_STIFFNESS: f64 = 12.0;
 const SAMPLES: usize = 1000;
 /// As many show that a scan is far from noisy, as most are.
 const GLANCE: usize = 150;
-/// Mean of |x| below its median, of a standard normal variable. The lower half, for noise is everywhere, folds are not.
-const LOWER_HALF: f64 = 0.3247;
+/// Mean of |x| below its lower quartile, of a standard normal variable. The lower quarter, for noise is everywhere, crumple is not.
+const LOWER_QUARTER: f64 = 0.1580;
 /// Terms of a cubic in two variables.
 const TERMS: usize = 10;
 
@@ -141,10 +141,10 @@ fn level(mesh: &TriMesh, around: &Around, samples: usize) -> f64 {
     if off.is_empty() {
         return 0.0;
     }
-    let half = off.len().div_ceil(2);
-    off.select_nth_unstable_by(half - 1, f64::total_cmp);
-    let mean = off[..half].iter().sum::<f64>() / half as f64;
-    mean / LOWER_HALF / mean_edge(mesh).max(f64::MIN_POSITIVE)
+    let quarter = off.len().div_ceil(4);
+    off.select_nth_unstable_by(quarter - 1, f64::total_cmp);
+    let mean = off[..quarter].iter().sum::<f64>() / quarter as f64;
+    mean / LOWER_QUARTER / mean_edge(mesh).max(f64::MIN_POSITIVE)
 }
 
 /// How far an inner vertex lies from the cubic fitted to the two rings around it, scene units, in standard deviations of one vertex: the
@@ -232,11 +232,14 @@ mod tests {
 
         #[test]
         fn noise_is_measured_and_taken_off(n in 24usize..40, noise in 0.2..0.5f64, seed: u64) {
-            let noisy = shaken(&sheet(n, |_, _| true, waves), noise / n as f64, seed);
-            // Even over ± noise; the mean edge of the squares' halves is 1.14 of their side.
+            // Even noise three times over is near enough to normal, with the variance of once; the mean edge of the squares' halves is 1.14 of
+            // their side.
+            let amount = noise / n as f64 / 3f64.sqrt();
+            let clean = sheet(n, |_, _| true, waves);
+            let noisy = (0..3).fold(clean, |mesh, turn| shaken(&mesh, amount, seed.wrapping_add(turn)));
             let true_level = noise / 3f64.sqrt() / 1.14;
             let level = noise_level(&noisy);
-            prop_assert!((level / true_level - 1.0).abs() < 0.3, "{level} {true_level}");
+            prop_assert!((level / true_level - 1.0).abs() < 0.4, "{level} {true_level}");
             let smooth = denoised(&noisy);
             prop_assert!(smooth.is_some());
             if let Some(smooth) = smooth {
