@@ -8,10 +8,16 @@ use darn::serve::{Autodiff, Backend, NetworkArgs};
 use std::path::{Path, PathBuf};
 
 /// The weights that are used when none are named; the first are the default ones.
-const SHIPPED: [(&str, &[u8]); 1] = [(
-    STANDARD,
-    include_bytes!("../../weights/standard.safetensors"),
-)];
+const SHIPPED: [(&str, &[u8]); 2] = [
+    (
+        STANDARD,
+        include_bytes!("../../weights/standard.safetensors"),
+    ),
+    (
+        "interpen.safetensors",
+        include_bytes!("../../weights/interpen.safetensors"),
+    ),
+];
 /// The default weights' file in a directory of weights.
 const STANDARD: &str = "standard.safetensors";
 
