@@ -86,7 +86,7 @@ impl Default for Options {
     }
 }
 
-/// One grid's base with what is known laid over it: [`crate::net::over`] on planes `[3, 64, 64]` and a mask `[64, 64]`.
+/// One grid's base with what is known laid over it, as `net::over` does it, on planes `[3, 64, 64]` and a mask `[64, 64]`.
 pub fn over(base: &[f32], positions: &[f32], known: &[f32]) -> Vec<f32> {
     let off: Vec<f32> = positions.iter().zip(base).map(|(p, b)| p - b).collect();
     let mut filled = vec![0.0; base.len()];
