@@ -79,18 +79,7 @@ impl Prepared {
     /// Prepares a hole; with smaller and smaller regions when one gives no usable chart, and at last with the scanner's noise.
     pub fn new(cloth: &Cloth, id: u32, limits: &Limits) -> Result<Prepared, MendError> {
         let reach = reach_for(extent_at_a_glance(cloth, id));
-        let noisy = Cell::new(false);
-        let smoothed = |mesh: &TriMesh| {
-            let smooth = denoised(mesh);
-            noisy.set(noisy.get() || smooth.is_some());
-            smooth
-        };
-        match Self::within((reach, &smoothed), cloth, id, limits) {
-            Err(error) if noisy.get() && may_shrink(&error) => {
-                Self::within((reach, &|_| None), cloth, id, limits).map_err(|_| error)
-            }
-            outcome => outcome,
-        }
+        without_noise(|smoothed| Self::within((reach, smoothed), cloth, id, limits))
     }
 
     fn within(
@@ -224,6 +213,20 @@ impl Prepared {
 
 /// A mesh without the scanner's noise; none where it has none.
 type Smoothing<'a> = &'a dyn Fn(&TriMesh) -> Option<TriMesh>;
+
+/// What comes of cloth without the scanner's noise; where that cannot be used, of the cloth as it was scanned.
+fn without_noise<T>(attempt: impl Fn(Smoothing) -> Result<T, MendError>) -> Result<T, MendError> {
+    let noisy = Cell::new(false);
+    let smoothed = |mesh: &TriMesh| {
+        let smooth = denoised(mesh);
+        noisy.set(noisy.get() || smooth.is_some());
+        smooth
+    };
+    match attempt(&smoothed) {
+        Err(error) if noisy.get() && may_shrink(&error) => attempt(&|_| None).map_err(|_| error),
+        outcome => outcome,
+    }
+}
 
 /// Cloth around a hole, laid flat.
 struct Laid {
@@ -419,4 +422,46 @@ fn inside(polygon: &[Vec2], p: Vec2) -> bool {
         (a.y <= p.y) != (b.y <= p.y) && a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x) > p.x
     });
     crossed.count() % 2 == 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes::{shaken, sheet};
+
+    #[test]
+    fn a_noisy_scan_is_the_last_resort() {
+        let clean = sheet(30, |_, _| true, |u, v| Vec3::new(u, v, 0.0));
+        let noisy = shaken(&clean, 0.3 / 30.0, 7);
+        let crosses = || MendError::Patch {
+            hole: 1,
+            source: PatchError::RimCrosses,
+        };
+        let tries = Cell::new(0);
+        // Fails where the cloth was smoothed, and with it off where `stubborn`.
+        let attempt = |scan: &TriMesh, stubborn: bool| {
+            tries.set(0);
+            without_noise(|smoothed| {
+                tries.set(tries.get() + 1);
+                match smoothed(scan) {
+                    None if !stubborn => Ok("as scanned"),
+                    _ => Err(crosses()),
+                }
+            })
+        };
+        assert_eq!(attempt(&clean, false).ok(), Some("as scanned"));
+        assert_eq!(tries.get(), 1);
+        assert_eq!(attempt(&noisy, false).ok(), Some("as scanned"));
+        assert_eq!(tries.get(), 2);
+        assert!(attempt(&noisy, true).is_err() && tries.get() == 2);
+        // Nothing else would come of cloth that had no noise, or of another error.
+        assert!(attempt(&clean, true).is_err() && tries.get() == 1);
+        let unlike = |smoothed: Smoothing| -> Result<(), MendError> {
+            tries.set(tries.get() + 1);
+            smoothed(&noisy);
+            Err(MendError::NonManifold { hole: 1 })
+        };
+        tries.set(0);
+        assert!(without_noise(unlike).is_err() && tries.get() == 1);
+    }
 }
