@@ -21,14 +21,14 @@ class Samples:
         self.known, self.hole, self.valid = ((flags & bit > 0).float() for bit in (1, 2, 4))
 
 
-def difference(x, dim):
-    n = x.shape[dim]
-    return x.narrow(dim, 1, n - 1) - x.narrow(dim, 0, n - 1)
-
-
 def both(x, dim, join):
+    """Joins every cell but the last along a dimension: the next one, and itself."""
     n = x.shape[dim]
     return join(x.narrow(dim, 1, n - 1), x.narrow(dim, 0, n - 1))
+
+
+def difference(x, dim):
+    return both(x, dim, torch.sub)
 
 
 def mean(x, weight):

@@ -62,11 +62,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if sheets.is_empty() || args.samples == 0 {
         return Err(Failure::Usage("there is nothing to measure".into()));
     }
-    let turning = if args.upright {
-        Turning::Upright
-    } else {
-        Turning::Any
-    };
+    let turning = Turning::keeping_up(args.upright);
     let cases = evaluate::draw(&Sampler::new(&sheets, turning), args.samples, args.seed);
     if args.masks {
         return masks(args, &sheets, &evaluate::of_samples(&cases));

@@ -5,6 +5,7 @@ use super::files;
 use darn::mend::{Limits, Mender};
 use darn::net::{BackendKind, Network, Networks, Settings};
 use darn::serve::{Autodiff, Backend, NetworkArgs};
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 /// The weights that are used when none are named; the first are the default ones.
@@ -34,7 +35,7 @@ pub fn mender(args: &NetworkArgs) -> Result<Mender, Failure> {
     let load =
         |bytes: &[u8], name: &str| Network::load(bytes, settings).or_fail(format!("load {name}"));
     let networks: Result<Vec<Network>, Failure> = match &args.weights {
-        None => (SHIPPED.iter())
+        None => (SHIPPED.par_iter())
             .map(|(name, bytes)| load(bytes, &format!("the shipped {name}")))
             .collect(),
         Some(path) if path.is_dir() => (in_directory(path)?.iter())

@@ -2,15 +2,13 @@
 
 use super::failure::{Failure, OrFail};
 use darn::net::{FrameKind, UnetConfig};
-use darn::scarffolds::samples::{Sampler, Turning};
-use darn::scarffolds::sheets;
-use darn::train::batch::{Recipe, prepare};
+use darn::scarffolds::samples::Turning;
+use darn::train::batch::{Prepared, Recipe, prepare};
 use darn::train::{self, record};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::io::{ErrorKind, IsTerminal, Write};
 use std::path::PathBuf;
-use std::sync::Arc;
 
 /// Samples written at once.
 const TOGETHER: usize = 64;
@@ -47,49 +45,44 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             "records are bytes: send standard output to a file or a program".into(),
         ));
     }
-    let sheets = sheets::read(&args.sheets).or_fail("read the sheets")?;
-    if sheets.is_empty() {
-        return Err(Failure::Usage(format!(
-            "there are no sheets in {}",
-            args.sheets.display()
-        )));
-    }
-    let (turning, frame) = match args.upright {
-        true => (Turning::Upright, FrameKind::Hanging),
-        false => (Turning::Any, FrameKind::Canonical),
-    };
+    let turning = Turning::keeping_up(args.upright);
+    let sampler = train::sampler(&args.sheets, turning).or_fail("read the sheets")?;
     let network = UnetConfig {
-        frame,
+        frame: match args.upright {
+            true => FrameKind::Hanging,
+            false => FrameKind::Canonical,
+        },
         ..UnetConfig::default()
     };
-    let (sampler, alike) = (Sampler::new(&sheets, turning), args.alike.max(1));
+    let mut records = Vec::new();
+    // Whether anybody reads on.
+    let mut send = |samples: &[Prepared]| {
+        records.clear();
+        record::write(samples, &mut records);
+        match out.write_all(&records) {
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
+            written => written.or_fail("write samples").map(|()| true),
+        }
+    };
     if args.held_out {
         let samples = train::held_out(&sampler);
         let samples = samples.iter().filter_map(|s| prepare(s, &network));
-        let mut records = Vec::new();
-        record::write(&samples.collect::<Vec<_>>(), &mut records);
-        return out.write_all(&records).or_fail("write samples");
+        return send(&samples.collect::<Vec<_>>()).map(|_| ());
     }
-    let sampler = sampler.roughest_of(args.roughest_of);
     let recipe = Recipe {
-        source: Arc::new(move |rng| sampler.alike(alike, rng)),
+        source: train::source(sampler.roughest_of(args.roughest_of), args.alike),
         network,
         size: TOGETHER,
         seed: args.seed,
     };
     let mut rng = ChaCha8Rng::seed_from_u64(args.seed);
     let mut left = args.count.unwrap_or(usize::MAX);
-    let mut records = Vec::with_capacity(TOGETHER * record::RECORD);
     while left > 0 {
         let mut samples = recipe.samples(&mut rng);
         samples.truncate(left);
         left -= samples.len();
-        records.clear();
-        record::write(&samples, &mut records);
-        match out.write_all(&records) {
-            // Whoever reads has enough.
-            Err(error) if error.kind() == ErrorKind::BrokenPipe => return Ok(()),
-            written => written.or_fail("write samples")?,
+        if !send(&samples)? {
+            break;
         }
     }
     Ok(())

@@ -33,6 +33,16 @@ pub enum Turning {
     Upright,
 }
 
+impl Turning {
+    /// How samples are turned when up is to stay up, or not.
+    pub fn keeping_up(upright: bool) -> Self {
+        match upright {
+            true => Self::Upright,
+            false => Self::Any,
+        }
+    }
+}
+
 /// Draws samples from sheets.
 #[derive(Debug, Clone)]
 pub struct Sampler {

@@ -35,6 +35,7 @@ use crate::scarffolds;
 use crate::scarffolds::samples::{Sampler, Turning};
 
 pub use crate::scarffolds::samples::Sample;
+pub use batch::Source;
 pub use burned::Burned;
 pub use engined::Engined;
 pub use loss::{LossKind, LossWeights};
@@ -167,18 +168,14 @@ pub fn run(
     options: &TrainOptions,
     progress: &mut dyn FnMut(&Progress),
 ) -> Result<Summary, TrainError> {
-    let turning = match options.upright {
-        true => Turning::Upright,
-        false => Turning::Any,
-    };
+    let turning = Turning::keeping_up(options.upright);
     let train = sampler(&options.sheets, turning)?.roughest_of(options.roughest_of);
     let held_out = held_out(&sampler(&options.held_out, turning)?);
-    let alike = options.alike.max(1);
     let data_seed = scarffolds::sheets::read_manifest(&options.sheets)
         .ok()
         .map(|manifest| manifest.seed);
     let sources = Sources {
-        train: Arc::new(move |rng| train.alike(alike, rng)),
+        train: source(train, options.alike),
         held_out,
         data_seed,
     };
@@ -197,7 +194,17 @@ pub fn held_out(sheets: &Sampler) -> Vec<Sample> {
     samples.collect()
 }
 
-fn sampler(dir: &Path, turning: Turning) -> Result<Sampler, TrainError> {
+/// Draws samples to learn from, so many of each hole.
+pub fn source(sheets: Sampler, alike: usize) -> Source {
+    let alike = alike.max(1);
+    Arc::new(move |rng| sheets.alike(alike, rng))
+}
+
+/// A sampler over the sheets of a folder.
+///
+/// # Errors
+/// An unreadable folder, or an empty one.
+pub fn sampler(dir: &Path, turning: Turning) -> Result<Sampler, TrainError> {
     let refuse = |reason: String| TrainError::Sheets {
         path: dir.to_owned(),
         reason,

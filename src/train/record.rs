@@ -9,7 +9,8 @@
 
 use super::batch::{Batch, Prepared};
 use crate::grid::CELLS;
-use crate::net::engine::over;
+use crate::net::InputKind;
+use crate::net::engine::{Input, seen};
 
 /// Bytes of one record.
 pub const RECORD: usize = 2 * 3 * CELLS * 4 + 3 * 4 + CELLS;
@@ -18,7 +19,13 @@ pub const RECORD: usize = 2 * 3 * CELLS * 4 + 3 * 4 + CELLS;
 pub fn write(samples: &[Prepared], records: &mut Vec<u8>) {
     for sample in samples {
         let batch = Batch::of(std::slice::from_ref(sample));
-        let seen = over(&batch.base, &batch.positions, &batch.known);
+        let grid = Input {
+            positions: &batch.positions,
+            known: &batch.known,
+            base: Some(&batch.base),
+            up: None,
+        };
+        let seen = seen(InputKind::Plate, grid);
         let numbers = seen.iter().chain(&batch.truth).chain(&batch.up);
         records.extend(numbers.flat_map(|x| x.to_le_bytes()));
         let flags = |k: usize| {

@@ -28,8 +28,8 @@ use std::ops::Range;
 use std::sync::OnceLock;
 
 use crate::grid::CELLS;
-use crate::net::UnetConfig;
 use crate::net::weights::NamedTensors;
+use crate::net::{InputKind, UnetConfig};
 
 use network::{Folds, Forward, Reverse};
 use simd::Target;
@@ -86,13 +86,11 @@ impl Default for Options {
     }
 }
 
-/// One grid's base with what is known laid over it, as `net::over` does it, on planes `[3, 64, 64]` and a mask `[64, 64]`.
-pub fn over(base: &[f32], positions: &[f32], known: &[f32]) -> Vec<f32> {
-    let off: Vec<f32> = positions.iter().zip(base).map(|(p, b)| p - b).collect();
-    let mut filled = vec![0.0; base.len()];
-    let mut pyramid = membrane::Pyramid::default();
-    membrane::membrane(Target::best(), &mut pyramid, (&off, known), &mut filled);
-    filled.iter_mut().zip(base).for_each(|(x, b)| *x += b);
+/// One grid as a network of this input sees it: positions, planes `[3, 64, 64]`.
+pub fn seen(kind: InputKind, grid: Input) -> Vec<f32> {
+    let mut filled = vec![0.0; grid.positions.len()];
+    let room = &mut scratch::Room::default();
+    scratch::enter((Target::best(), kind), (room, false), grid, &mut filled);
     filled
 }
 

@@ -6,7 +6,7 @@ use super::backward::Gradients;
 use super::forward::{Activations, Saved};
 use super::map::Map;
 use super::membrane::{Pyramid, adjoint, membrane};
-use super::simd::{Block, Kernel, LANES, Simd};
+use super::simd::{Block, Kernel, LANES, Simd, Target};
 use super::{Cotangent, Engine, Gradient, Input};
 use crate::grid::{CELLS, SIDE};
 use crate::net::InputKind;
@@ -257,7 +257,8 @@ pub fn show(
     for image in 0..input.images() {
         let grid = input.part(image..image + 1);
         let filled = image3_mut(filled, image);
-        enter(engine, (fill, again), grid, filled);
+        let how = (engine.target, engine.config.input);
+        enter(how, (fill, again), grid, filled);
         lay_out((filled, grid), image, map);
     }
 }
@@ -279,13 +280,13 @@ pub fn say((engine, threads): (&Engine, usize), features: &Map, all: &mut [f32])
 }
 
 /// One grid's positions as the network sees them, but for their scale.
-fn enter(
-    engine: &Engine,
+pub(super) fn enter(
+    (target, kind): (Target, InputKind),
     (Room { pyramid, off }, again): (&mut Room, bool),
     grid: Input,
     filled: &mut [f32],
 ) {
-    match engine.config.input {
+    match kind {
         InputKind::Membrane | InputKind::Plate => {
             let off = off_base(grid, off);
             let none = |(k, x): (usize, &f32)| x * grid.known[k % CELLS] == 0.0;
@@ -293,7 +294,7 @@ fn enter(
                 // Without anchors a base goes through all that is known, and the membrane over it is zero.
                 filled.fill(0.0);
             } else {
-                membrane(engine.target, pyramid, (off, grid.known), filled);
+                membrane(target, pyramid, (off, grid.known), filled);
             }
             for (to, base) in filled.iter_mut().zip(grid.base.unwrap_or_default()) {
                 *to += base;
