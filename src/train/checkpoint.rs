@@ -52,7 +52,8 @@ pub fn save(
     };
     let header = Header {
         step: snapshot.step,
-        seconds,
+        // Short decimals are read back as they were; serde_json may miss the last digit of others.
+        seconds: (seconds * 1e3).round() / 1e3,
         options: options.clone(),
     };
     let header = serde_json::to_string(&header).map_err(|e| refuse(e.to_string()))?;

@@ -248,6 +248,32 @@ fn training_learns_resumes_and_ships_what_loads() {
 }
 
 #[test]
+fn a_checkpoint_that_is_read_and_written_again_is_the_same() {
+    let dir = tempfile::tempdir().unwrap();
+    let options = options(dir.path());
+    let empty = student::Snapshot {
+        network: Default::default(),
+        averaged: Default::default(),
+        moments: Vec::new(),
+        step: 3,
+    };
+    let read = || std::fs::read(dir.path().join("checkpoint.safetensors")).unwrap();
+    for k in 0..500 {
+        checkpoint::save(
+            &empty,
+            f64::from(k) * 0.37 + 1.0 / 7.0,
+            &options,
+            dir.path(),
+        )
+        .unwrap();
+        let first = read();
+        let (snapshot, seconds) = checkpoint::load(&options, dir.path()).unwrap();
+        checkpoint::save(&snapshot, seconds, &options, dir.path()).unwrap();
+        assert!(first == read(), "{k}");
+    }
+}
+
+#[test]
 fn the_engine_goes_on_from_what_burn_has_learned() {
     let (dir, further) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let first = trainer::train::<B>(&options(dir.path()), sources(), &mut |_| {}).unwrap();
