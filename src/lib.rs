@@ -16,6 +16,7 @@ pub mod mend;
 pub mod mesh;
 pub mod net;
 pub mod patch;
+mod plain;
 pub mod render;
 pub mod scan;
 pub mod scarffolds;

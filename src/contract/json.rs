@@ -33,7 +33,7 @@ pub enum JsonError {
 /// # Errors
 /// `Syntax` when the text is not JSON, `Shape` with the place when it is not such a message.
 pub fn from_json<T: DeserializeOwned>(text: &[u8]) -> Result<T, JsonError> {
-    let value: Value = serde_json::from_slice(text).map_err(|error| JsonError::Syntax {
+    let value = crate::plain::value(text).map_err(|error| JsonError::Syntax {
         detail: error.to_string(),
     })?;
     T::deserialize(Node::bare(&value)).map_err(|fault| JsonError::Shape(fault.into_field_error()))

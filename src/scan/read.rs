@@ -30,7 +30,7 @@ pub(super) fn read(bytes: &[u8], limits: &Limits) -> Result<Scan, ScanError> {
         values_at_most(text),
         "",
     )?;
-    let json: Value = serde_json::from_slice(text).map_err(|error| ScanError::Container {
+    let json = crate::plain::value(text).map_err(|error| ScanError::Container {
         offset: layout.json.start + offset_of(text, error.line(), error.column()),
         detail: format!("the JSON does not parse: {error}"),
     })?;
