@@ -2,6 +2,7 @@
 //!
 //! A texture seam that runs into the hole runs on through the patch: each island of the texture around the rim is continued on its own
 //! (affine fit over the chart plus the harmonic extension of what is left at the rim), and the patch's faces are shared out among them.
+//! A seam is where columns differ, not where vertices do: scans whose faces share no vertices are dressed like those whose faces do.
 
 use std::collections::BTreeMap;
 
@@ -54,11 +55,13 @@ pub fn dress(
     chart: &Chart,
     columns: &Columns,
 ) -> Dressed {
-    let islands = Islands::of(columns);
+    let corners = shared_corners(region, columns);
+    let islands = islands(&corners, columns.width);
     let around = Around {
         columns,
         seam: plan.seam(),
         rim: rim_edges(patch, region, columns, &islands),
+        corners,
         islands,
     };
     let rim = &around.rim;
@@ -110,7 +113,10 @@ struct Around<'a> {
     seam: &'a Extension,
     /// The scan's side of every rim edge, in the patch's order.
     rim: Vec<Option<RimEdge>>,
-    islands: Islands,
+    /// Per region face: its [`shared_corners`].
+    corners: Vec<Option<[u32; 3]>>,
+    /// Per region face: its island.
+    islands: Vec<Option<u32>>,
 }
 
 /// The scan's side of a rim edge, from rim vertex k to k + 1.
@@ -133,46 +139,75 @@ fn scan_vertex(rim: &[Option<RimEdge>], vertex: u32, island: u32) -> Option<u32>
         .or_else(|| of(rim[(k + rim.len() - 1) % rim.len()]).map(|e| e.to))
 }
 
-/// The island of every scan vertex that has attributes to carry: region faces joined where they share scan vertices.
-struct Islands {
-    /// The vertices, ascending.
-    vertices: Vec<u32>,
-    /// Of each its island, named by its lowest vertex.
-    labels: Vec<u32>,
+/// Per region face: its corners, with one scan vertex for all that share a place and columns and differ in nothing but their number.
+///
+/// O(n log n) in the corners.
+fn shared_corners(region: &Region, columns: &Columns) -> Vec<Option<[u32; 3]>> {
+    let faces = || region.mesh.faces.iter().zip(columns.corners);
+    let mut uses: Vec<(u32, u32)> = faces()
+        .filter_map(|(face, corners)| Some(face.iter().copied().zip((*corners)?)))
+        .flatten()
+        .collect();
+    uses.sort_unstable();
+    uses.dedup();
+    let firsts: Vec<u32> = uses
+        .chunk_by(|a, b| a.0 == b.0)
+        .flat_map(|at_one_place| first_alike(at_one_place, columns))
+        .collect();
+    let first = |used: (u32, u32)| firsts[uses.partition_point(|other| *other < used)];
+    faces()
+        .map(|(face, corners)| {
+            corners.map(|corners| std::array::from_fn(|k| first((face[k], corners[k]))))
+        })
+        .collect()
 }
 
-impl Islands {
-    fn of(columns: &Columns) -> Islands {
-        let all = || columns.corners.iter().flatten();
-        let mut vertices: Vec<u32> = all().flatten().copied().collect();
-        vertices.sort_unstable();
-        vertices.dedup();
-        let place = |v: &u32| vertices.partition_point(|other| other < v);
-        let mut parent: Vec<usize> = (0..vertices.len()).collect();
-        let root = |parent: &[usize], mut k: usize| {
-            while parent[k] != k {
-                k = parent[k];
-            }
-            k
-        };
-        for corners in all() {
-            let places = corners.each_ref().map(place);
-            let roots = places.map(|k| root(&parent, k));
-            let lowest = roots[0].min(roots[1]).min(roots[2]);
-            // Pointing the corners themselves at the root as well keeps the paths short.
-            (roots.iter().chain(&places)).for_each(|k| parent[*k] = lowest);
-        }
-        let labels = (0..vertices.len())
-            .map(|k| vertices[root(&parent, k)])
-            .collect();
-        Islands { vertices, labels }
+/// For each of the scan vertices at one region vertex: the first of them with the same columns.
+fn first_alike(uses: &[(u32, u32)], columns: &Columns) -> Vec<u32> {
+    // Nearly all vertices of an indexed scan are alone, and reading columns takes a while.
+    if let [(_, alone)] = uses {
+        return vec![*alone];
     }
+    let mut seen = BTreeMap::new();
+    uses.iter()
+        .map(|(_, scan)| {
+            let values = (columns.values)(*scan).into_iter();
+            // Adding 0 turns −0, which equals it, into the same bits.
+            let bits: Vec<u64> = values.map(|x| (x + 0.0).to_bits()).collect();
+            *seen.entry(bits).or_insert(*scan)
+        })
+        .collect()
+}
 
-    /// The island of a scan vertex of the region; none without attributes.
-    fn get(&self, vertex: u32) -> Option<u32> {
-        let place = self.vertices.binary_search(&vertex).ok()?;
-        Some(self.labels[place])
+/// The island of every region face, named by its lowest vertex: faces joined where they share vertices; none without attributes.
+fn islands(corners: &[Option<[u32; 3]>], width: usize) -> Vec<Option<u32>> {
+    // Where nothing is carried on, nothing is to be kept apart.
+    if width == 0 {
+        return corners.iter().map(|c| c.map(|_| 0)).collect();
     }
+    let all = || corners.iter().flatten();
+    let mut vertices: Vec<u32> = all().flatten().copied().collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    let place = |v: &u32| vertices.partition_point(|other| other < v);
+    let mut parent: Vec<usize> = (0..vertices.len()).collect();
+    let root = |parent: &[usize], mut k: usize| {
+        while parent[k] != k {
+            k = parent[k];
+        }
+        k
+    };
+    for corners in all() {
+        let places = corners.each_ref().map(place);
+        let roots = places.map(|k| root(&parent, k));
+        let lowest = roots[0].min(roots[1]).min(roots[2]);
+        // Pointing the corners themselves at the root as well keeps the paths short.
+        (roots.iter().chain(&places)).for_each(|k| parent[*k] = lowest);
+    }
+    corners
+        .iter()
+        .map(|corners| corners.map(|[v, ..]| vertices[root(&parent, place(&v))]))
+        .collect()
 }
 
 /// The scan's side of every rim edge, in the patch's order; `None` where the face there has no attributes to carry.
@@ -180,7 +215,7 @@ fn rim_edges(
     patch: &Patch,
     region: &Region,
     columns: &Columns,
-    islands: &Islands,
+    islands: &[Option<u32>],
 ) -> Vec<Option<RimEdge>> {
     let count = patch.rim.len();
     // The face beside the rim runs along it the other way round.
@@ -188,12 +223,15 @@ fn rim_edges(
         .map(|k| ((patch.rim[(k + 1) % count], patch.rim[k]), k))
         .collect();
     let mut edges = vec![None; count];
-    for (face, corners) in region.mesh.faces.iter().zip(columns.corners) {
-        let Some(corners) = corners else { continue };
+    let faces = region.mesh.faces.iter().zip(columns.corners);
+    for ((face, corners), island) in faces.zip(islands) {
+        let (Some(corners), Some(island)) = (*corners, *island) else {
+            continue;
+        };
         for k in 0..3 {
             if let Some(edge) = wanted.get(&(face[k], face[(k + 1) % 3])) {
                 let (to, from) = (corners[k], corners[(k + 1) % 3]);
-                edges[*edge] = islands.get(from).map(|island| RimEdge { island, from, to });
+                edges[*edge] = Some(RimEdge { island, from, to });
             }
         }
     }
@@ -252,9 +290,9 @@ fn continued(
 ) -> Vec<Vec<f64>> {
     let (columns, rim) = (around.columns, &around.rim);
     let mut samples: Vec<(u32, Vec2)> = Vec::new();
-    for (face, corners) in region.mesh.faces.iter().zip(columns.corners) {
-        // The corners of a face are of one island.
-        if let Some(corners) = corners.filter(|c| around.islands.get(c[0]) == Some(label)) {
+    let faces = region.mesh.faces.iter().zip(&around.corners);
+    for ((face, corners), island) in faces.zip(&around.islands) {
+        if let Some(corners) = corners.filter(|_| *island == Some(label)) {
             let flat = face.map(|v| chart.flat[v as usize]);
             samples.extend(corners.into_iter().zip(flat));
         }
@@ -336,4 +374,86 @@ fn affine_fit(samples: &[(u32, Vec2)], columns: &Columns, patch: &Patch) -> DMat
         0 => solution[(0, c)] - (solution[(1, c)] * centre.x + solution[(2, c)] * centre.y) / scale,
         _ => solution[(r, c)] / scale,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+    use crate::flatten::{Limits, flatten};
+    use crate::mesh::loops::{LoopKind, boundary_loops};
+    use crate::mesh::shapes::{exploded, sheet, together};
+    use crate::mesh::weld::weld;
+    use crate::mesh::{TriMesh, Vec3, region};
+    use crate::patch::{Options, plan};
+
+    /// A wavy sheet with a round hole, and its texture: right of the middle mirrored, on vertices of its own.
+    fn two_islands() -> (TriMesh, Vec<Vec<f64>>) {
+        let [left, right] = [false, true].map(|right| {
+            let keep = |u: f64, v: f64| (u > 0.5) == right && (u - 0.5).hypot(v - 0.5) > 0.2;
+            sheet(36, keep, |u, v| Vec3::new(u, v, 0.06 * (10.0 * u).sin()))
+        });
+        let plain = left.positions.iter().map(|p| vec![0.4 * p.x, p.y]);
+        let mirrored = right.positions.iter().map(|p| vec![1.0 - 0.4 * p.x, p.y]);
+        (together(&left, &right), plain.chain(mirrored).collect())
+    }
+
+    /// The dressed patch of a soup's hole; `texture` holds the columns of its vertices.
+    fn dressed(soup: &TriMesh, texture: &[Vec<f64>]) -> Dressed {
+        let welded = weld(soup);
+        let topology = welded.topology();
+        let loops = boundary_loops(&welded.mesh, &topology);
+        let hole = loops.iter().position(|l| l.kind == LoopKind::Hole).unwrap();
+        let region = region::grow(&welded.mesh, &topology, &loops, hole, f64::INFINITY).unwrap();
+        let chart = flatten(&region, &Limits::default()).unwrap();
+        let (options, filled) = (Options::default(), vec![Vec3::zeros(); crate::grid::CELLS]);
+        let plan = plan(&region, &chart, &options).unwrap();
+        let patch = plan.patch(&chart, &filled, &[], &options).unwrap();
+
+        let source = |f: &u32| soup.faces[welded.face_of[*f as usize] as usize];
+        let corners: Vec<Option<[u32; 3]>> = region.faces.iter().map(|f| Some(source(f))).collect();
+        let mut any = vec![0; region.mesh.positions.len()];
+        for (face, f) in region.mesh.faces.iter().zip(&region.faces) {
+            (face.iter().zip(source(f))).for_each(|(v, s)| any[*v as usize] = s);
+        }
+        let values = |s: u32| texture[s as usize].clone();
+        let columns = Columns {
+            corners: &corners,
+            any: &any,
+            values: &values,
+            width: texture[0].len(),
+        };
+        dress((&plan, &patch), &region, &chart, &columns)
+    }
+
+    #[test]
+    fn faces_that_share_no_vertices_are_dressed_like_those_that_do() {
+        let (soup, texture) = two_islands();
+        let own: Vec<Vec<f64>> = (soup.faces.iter().flatten())
+            .map(|v| texture[*v as usize].clone())
+            .collect();
+        let shared = dressed(&soup, &texture);
+        let apart = dressed(&exploded(&soup), &own);
+        assert_eq!(apart.faces, shared.faces);
+        assert_eq!(apart.corners.len(), shared.corners.len());
+        for (a, b) in apart.corners.iter().zip(&shared.corners) {
+            assert_eq!(a.vertex, b.vertex);
+            let off = (a.values.iter().zip(&b.values)).map(|(a, b)| (a - b).abs());
+            assert!(off.fold(0.0, f64::max) < 1e-6, "{a:?} {b:?}");
+        }
+        for face in &apart.faces {
+            let [a, b, c] = face.map(|v| apart.corners[v as usize].values[0]);
+            let smeared = a.max(b).max(c) - a.min(b).min(c);
+            assert!(smeared < 0.1, "a triangle spans two islands: {a} {b} {c}");
+        }
+    }
+
+    #[test]
+    fn without_columns_there_are_no_seams() {
+        let soup = exploded(&two_islands().0);
+        let bare = dressed(&soup, &vec![Vec::new(); soup.positions.len()]);
+        let vertices: BTreeSet<u32> = bare.corners.iter().map(|c| c.vertex).collect();
+        assert_eq!(vertices.len(), bare.corners.len());
+    }
 }
