@@ -325,7 +325,7 @@ impl Laid {
             // As far as cloth of the hole's extent can be from its rim.
             let beyond = 0.5 * extent(&polygon) * self.chart.frame.side;
             let others = layers_near(&cloth.welded.mesh, &self.region, beyond);
-            let plan = patch::plan(seen, &self.chart, &limits.patch)
+            let plan = patch::plan_in(&cloth.welded.mesh, seen, &self.chart, &limits.patch)
                 .and_then(|plan| match &self.smooth {
                     Some(_) => plan.joining(&self.region.mesh.positions),
                     None => Ok(plan),

@@ -20,7 +20,7 @@ mod triangulate;
 mod untangle;
 
 pub use cloth::Elastics;
-pub use plan::{Plan, bearable, plan};
+pub use plan::{Plan, bearable, plan, plan_in};
 pub use pull::{Hold, Pull};
 pub use triangulate::signed_area;
 
@@ -63,7 +63,8 @@ impl Default for Options {
 /// Triangles that close a hole.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Patch {
-    /// Region vertices of the rim, counter-clockwise around the patch; they are the patch's first vertices.
+    /// Region vertices of the rim, counter-clockwise around the patch; they are the patch's first vertices. Where the rim touches itself it
+    /// comes to a place more than once, each time at another vertex, and the patch is several pieces that meet there.
     pub rim: Vec<u32>,
     /// All vertices in the plane of the chart, scene units.
     pub flat: Vec<Vec2>,

@@ -5,14 +5,16 @@ use super::contacts::Surroundings;
 use super::harmonic::Extension;
 use super::hem::Hem;
 use super::pull::Pull;
-use super::triangulate::{self, Triangulation};
-use super::{Options, Patch, PatchError, untangle};
+use super::triangulate::Triangulation;
+use super::{Options, Patch, PatchError};
 
+mod tile;
 mod touch;
 use crate::flatten::Chart;
 use crate::grid;
 use crate::mesh::region::Region;
 use crate::mesh::{TriMesh, Vec2, Vec3};
+use tile::Places;
 pub use touch::bearable;
 
 /// Everything about a patch that does not depend on what fills the hole; owned, so that a session can keep it.
@@ -29,22 +31,53 @@ pub struct Plan {
     surroundings: Surroundings,
 }
 
-/// Plans the patch of a region's hole.
+/// Plans the patch of a region's hole, knowing of the scan no more than the region.
 ///
 /// # Errors
 /// `RimCrosses` when the chart overlaps itself at the hole, `Singular` when triangles degenerate.
 pub fn plan(region: &Region, chart: &Chart, options: &Options) -> Result<Plan, PatchError> {
-    // The rim runs with the cloth on its left, so with the hole on its right: turned round it encloses the patch.
-    let rim: Vec<u32> = region.rim.iter().rev().copied().collect();
-    let polygon: Vec<Vec2> = rim.iter().map(|v| chart.flat[*v as usize]).collect();
-    let polygon = untangle::untangled(&polygon).ok_or(PatchError::RimCrosses)?;
-    let mut tiled =
-        triangulate::triangulate(&polygon, spacing(region, chart), options.most_vertices)?;
-    split_taken_chords(&mut tiled, &rim, region);
+    let rim = turned(region);
+    let places = Places::of(&at(&rim, &region.mesh), &region.mesh);
+    planned(rim, places, (region, chart), options)
+}
 
-    let own: Vec<Vec3> = (rim.iter())
-        .map(|v| region.mesh.positions[*v as usize])
-        .collect();
+/// Plans the patch of a region's hole in the whole scan: the region's positions may be others than the scan's (without its noise), and
+/// cloth beyond it may touch the rim.
+///
+/// # Errors
+/// `RimCrosses` when the chart overlaps itself at the hole, `Singular` when triangles degenerate.
+pub fn plan_in(
+    scan: &TriMesh,
+    region: &Region,
+    chart: &Chart,
+    options: &Options,
+) -> Result<Plan, PatchError> {
+    let rim = turned(region);
+    let scanned: Vec<u32> = (rim.iter()).map(|v| region.vertices[*v as usize]).collect();
+    let places = Places::of(&at(&scanned, scan), scan);
+    planned(rim, places, (region, chart), options)
+}
+
+/// The rim runs with the cloth on its left, so with the hole on its right: turned round it encloses the patch.
+fn turned(region: &Region) -> Vec<u32> {
+    region.rim.iter().rev().copied().collect()
+}
+
+fn at(vertices: &[u32], mesh: &TriMesh) -> Vec<Vec3> {
+    let position = |v: &u32| mesh.positions[*v as usize];
+    vertices.iter().map(position).collect()
+}
+
+fn planned(
+    rim: Vec<u32>,
+    places: Places,
+    (region, chart): (&Region, &Chart),
+    options: &Options,
+) -> Result<Plan, PatchError> {
+    let flat: Vec<Vec2> = rim.iter().map(|v| chart.flat[*v as usize]).collect();
+    let tiled = tile::tile(flat, places, spacing(region, chart), options.most_vertices)?;
+
+    let own = at(&rim, &region.mesh);
     let held: Vec<u32> = (0..rim.len() as u32).collect();
     let seam = Extension::new(&tiled.points, &tiled.faces, &held).map_err(|_| singular("seam"))?;
     let hem = Hem::around(&rim, &tiled, region, chart);
@@ -201,22 +234,6 @@ impl Plan {
 
 fn singular(stage: &'static str) -> PatchError {
     PatchError::Singular { stage }
-}
-
-/// Splits the patch's edges between rim vertices that the scan joins by an edge already.
-fn split_taken_chords(tiled: &mut Triangulation, rim: &[u32], region: &Region) {
-    let mut on_rim = vec![false; region.mesh.positions.len()];
-    rim.iter().for_each(|v| on_rim[*v as usize] = true);
-    let both = |(a, b): &(u32, u32)| on_rim[*a as usize] && on_rim[*b as usize];
-    let mut edges: Vec<(u32, u32)> = (region.mesh.faces.iter())
-        .flat_map(|f| (0..3).map(|k| (f[k].min(f[(k + 1) % 3]), f[k].max(f[(k + 1) % 3]))))
-        .filter(both)
-        .collect();
-    edges.sort_unstable();
-    tiled.split_chords(rim.len(), |a, b| {
-        let (a, b) = (rim[a as usize], rim[b as usize]);
-        edges.binary_search(&(a.min(b), a.max(b))).is_ok()
-    });
 }
 
 /// Edge length of a patch, in the plane: as fine as the grid that is drawn from, so that no fold drawn there is cut short, but between half

@@ -191,3 +191,36 @@ fn a_patch_meets_the_rim_where_it_really_lies_and_keeps_off_other_cloth_there() 
     assert!(beside.collisions > 0);
     assert_eq!((beside.crossings, cuts(&beside)), (0, 0));
 }
+
+/// Two square holes that touch in a corner have one rim. Without the scan's noise it lies in two places there, which on the scan are one.
+#[test]
+fn a_rim_that_touches_itself_is_closed_where_the_scan_lies() {
+    let square = |x: f64| (18.0 * x) as usize;
+    let in_hole = |u: f64, v: f64| {
+        let holes = [4usize..9, 9..14];
+        (holes.iter()).any(|hole| hole.contains(&square(u)) && hole.contains(&square(v)))
+    };
+    let wave = |u: f64, v: f64| Vec3::new(u, v, 0.05 * (9.0 * u).sin() * (5.0 * v).cos());
+    let scan = weld(&sheet(18, |u, v| !in_hole(u, v), wave)).mesh;
+    let topology = Topology::new(&scan);
+    let loops = boundary_loops(&scan, &topology);
+    let hole = loops.iter().position(|l| l.kind == LoopKind::Hole).unwrap();
+    let region = region::grow(&scan, &topology, &loops, hole, f64::INFINITY).unwrap();
+    let mut seen = region.clone();
+    let apart = (seen.mesh.positions.iter_mut()).enumerate();
+    apart.for_each(|(v, p)| p.z += 1e-3 * (v as f64).sin());
+    let chart = flatten(&seen, &Limits::default()).unwrap();
+    let options = Options::default();
+    let plan = plan_in(&scan, &seen, &chart, &options).unwrap();
+    let joining = plan.joining(&region.mesh.positions).unwrap();
+    let filled = vec![Vec3::zeros(); crate::grid::CELLS];
+    let patch = joining.patch(&chart, &filled, &[], &options).unwrap();
+
+    let whole = weld(&quality::joined(&patch, &region));
+    assert_eq!(whole.dropped, 0, "a triangle has no area");
+    let topology = Topology::new(&whole.mesh);
+    assert!(topology.non_manifold.is_empty());
+    assert_eq!(boundary_loops(&whole.mesh, &topology).len(), 1);
+    let inner = patch.positions.len() - patch.rim.len();
+    assert_eq!(whole.mesh.positions.len(), scan.positions.len() + inner - 1);
+}

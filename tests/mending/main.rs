@@ -4,3 +4,4 @@ mod cloth;
 mod editing;
 mod laws;
 mod requests;
+mod rims;
