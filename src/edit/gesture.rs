@@ -1,6 +1,8 @@
 //! What a hand does to cloth, as anchors: grab pulls a point, twist turns a disk, pinch gathers a fold between two points.
 //! Each gesture takes hold of the cloth as the ones before it left it.
 
+use std::cell::OnceCell;
+
 use nalgebra::{Rotation3, Unit};
 
 use super::drape::drape;
@@ -22,8 +24,12 @@ pub struct Hand<'a> {
     unedited: &'a dyn Fn(Vec2) -> Vec3,
     side: f64,
     placed: Vec<Wanted>,
-    /// How far each cell has moved.
-    moved: Vec<Vec3>,
+    /// Where each placed point lies on the unedited cloth: to ask that again costs a walk over the cloth's faces.
+    origins: Vec<Vec3>,
+    /// Per cell the last point placed in it.
+    held: Vec<Option<usize>>,
+    /// How far each cell has moved; there once a gesture has asked for it, until points are placed again.
+    moved: OnceCell<Vec<Vec3>>,
 }
 
 impl<'a> Hand<'a> {
@@ -38,10 +44,14 @@ impl<'a> Hand<'a> {
             hole,
             unedited,
             side,
-            placed: anchors,
-            moved: vec![Vec3::zeros(); CELLS],
+            placed: Vec::new(),
+            origins: Vec::new(),
+            held: vec![None; CELLS],
+            moved: OnceCell::new(),
         };
-        hand.settle();
+        for anchor in anchors {
+            hand.hold(anchor);
+        }
         hand
     }
 
@@ -54,6 +64,7 @@ impl<'a> Hand<'a> {
     ///
     /// Points in a cell that is held by a hard anchor are left alone. At most one point a cell is placed.
     pub fn act(&mut self, gesture: &Gesture) -> Vec<usize> {
+        // All that a gesture reads, it reads before it places anything.
         let goals = match *gesture {
             Gesture::Grab { uv, offset } => {
                 vec![(uv.into(), self.at(uv.into()) + Vec3::from(offset))]
@@ -74,27 +85,43 @@ impl<'a> Hand<'a> {
                 held.push(place);
             }
         }
-        self.settle();
+        self.moved = OnceCell::new();
         held
     }
 
     /// Where the cloth is now.
     fn at(&self, uv: Vec2) -> Vec3 {
-        let here = (self.unedited)(uv);
+        let by = match self.holding(uv) {
+            Some(held) => self.displacement(held),
+            None => evaluate(self.moved(), uv),
+        };
+        self.origin(uv) + by
+    }
+
+    /// Where the unedited cloth is.
+    fn origin(&self, uv: Vec2) -> Vec3 {
         match self.holding(uv) {
-            Some(held) => here + self.displacement(&self.placed[held]),
-            None => here + evaluate(&self.moved, uv),
+            Some(held) if self.placed[held].uv == uv => self.origins[held],
+            _ => (self.unedited)(uv),
         }
     }
 
     /// The last point placed in the cell of a uv.
     fn holding(&self, uv: Vec2) -> Option<usize> {
-        let cell = cell_at(uv);
-        self.placed.iter().rposition(|p| cell_at(p.uv) == cell)
+        self.held[cell_at(uv)]
     }
 
-    fn displacement(&self, placed: &Wanted) -> Vec3 {
-        placed.position - (self.unedited)(placed.uv)
+    fn displacement(&self, placed: usize) -> Vec3 {
+        self.placed[placed].position - self.origins[placed]
+    }
+
+    /// Adds a point to the placed ones; its index.
+    fn hold(&mut self, point: Wanted) -> usize {
+        let index = self.placed.len();
+        self.held[cell_at(point.uv)] = Some(index);
+        self.origins.push((self.unedited)(point.uv));
+        self.placed.push(point);
+        index
     }
 
     fn place(&mut self, uv: Vec2, position: Vec3) -> Option<usize> {
@@ -102,28 +129,26 @@ impl<'a> Hand<'a> {
             Some(held) if self.placed[held].firmness == Firmness::Hard => None,
             Some(held) => {
                 // The point keeps its own uv: what is moved is the place in the cell that was held already.
-                let by = position - (self.unedited)(uv);
-                let point = &mut self.placed[held];
-                point.position = (self.unedited)(point.uv) + by;
+                let by = position - self.origin(uv);
+                self.placed[held].position = self.origins[held] + by;
                 Some(held)
             }
-            None => {
-                self.placed.push(Wanted {
-                    uv,
-                    position,
-                    firmness: Firmness::Soft,
-                });
-                Some(self.placed.len() - 1)
-            }
+            None => Some(self.hold(Wanted {
+                uv,
+                position,
+                firmness: Firmness::Soft,
+            })),
         }
     }
 
-    /// Carries the placed points' displacements over the hole.
-    fn settle(&mut self) {
-        let fixed: Vec<(usize, Vec3)> = (self.placed.iter())
-            .map(|p| (cell_at(p.uv), self.displacement(p)))
-            .collect();
-        self.moved = drape(self.hole, &fixed);
+    /// The placed points' displacements carried over the hole.
+    fn moved(&self) -> &[Vec3] {
+        self.moved.get_or_init(|| {
+            let fixed: Vec<(usize, Vec3)> = (self.placed.iter().enumerate())
+                .map(|(k, p)| (cell_at(p.uv), self.displacement(k)))
+                .collect();
+            drape(self.hole, &fixed)
+        })
     }
 
     /// Turns the disk's cells, thinned evenly, and every point placed in it about the axis through its centre.
@@ -142,13 +167,8 @@ impl<'a> Hand<'a> {
             .chain(own)
             .chain(spread(&cells, MOST_OF_A_DISK))
             .collect();
-        let mut taken = Vec::new();
-        uvs.retain(|uv| {
-            let cell = cell_at(*uv);
-            let new = !taken.contains(&cell);
-            taken.push(cell);
-            new
-        });
+        let mut taken = vec![false; CELLS];
+        uvs.retain(|uv| !std::mem::replace(&mut taken[cell_at(*uv)], true));
         (uvs.into_iter())
             .map(|uv| (uv, middle + turn * (self.at(uv) - middle)))
             .collect()
@@ -276,6 +296,59 @@ mod tests {
         // Turned by half a turn about the disk's centre, and still as high as it was pulled.
         assert!((after.z - 0.1).abs() < 1e-9, "{after}");
         assert!((after.x - 0.9).abs() < 1e-9, "{after}");
+    }
+
+    #[test]
+    fn every_grab_finds_the_cloth_as_those_before_it_left_it() {
+        let hole = disk(14.0);
+        let mut hand = hand(&hole);
+        let grabs = [(0.42, 0.5), (0.5, 0.61), (0.42, 0.503), (0.55, 0.44)];
+        for (u, v) in grabs {
+            let uv = Vec2::new(u, v);
+            let carried = |p: &Wanted| (cell_at(p.uv), p.position - flat(p.uv));
+            let fixed: Vec<(usize, Vec3)> = hand.placed().iter().map(carried).collect();
+            let moved = match fixed.iter().rfind(|(cell, _)| *cell == cell_at(uv)) {
+                Some((_, by)) => *by,
+                None => evaluate(&drape(&hole, &fixed), uv),
+            };
+            let held = hand.act(&Gesture::Grab {
+                uv: [u, v],
+                offset: [0.1, u, 0.2],
+            });
+            let expected = moved + Vec3::new(0.1, u, 0.2);
+            let point = hand.placed()[held[0]];
+            assert!((point.position - flat(point.uv) - expected).norm() < 1e-12);
+        }
+        assert_eq!(hand.placed().len(), 3, "two of the grabs share a cell");
+    }
+
+    #[test]
+    fn placed_points_are_not_looked_up_again() {
+        let looks = std::cell::Cell::new(0usize);
+        let cloth = |uv: Vec2| {
+            looks.set(looks.get() + 1);
+            flat(uv)
+        };
+        let hole = disk(14.0);
+        let mut hand = Hand::new(&hole, &cloth, 2.0, Vec::new());
+        let grabbed: Vec<usize> = hole.indices().iter().copied().step_by(20).collect();
+        for cell in &grabbed {
+            hand.act(&Gesture::Grab {
+                uv: cell_centre(*cell).into(),
+                offset: [0.0, 0.0, 0.1],
+            });
+        }
+        assert_eq!(looks.get(), 2 * grabbed.len());
+        let twist = Gesture::Twist {
+            uv: cell_centre(grabbed[grabbed.len() / 2]).into(),
+            radius: 0.1,
+            axis: [0.0, 0.0, 1.0],
+            angle: 0.3,
+        };
+        hand.act(&twist);
+        looks.set(0);
+        hand.act(&twist);
+        assert_eq!(looks.get(), 0, "all of the disk is placed already");
     }
 
     #[test]

@@ -62,12 +62,69 @@ fn neighbours(mesh: &TriMesh) -> Vec<Option<(usize, usize)>> {
         leaving[*place] = h;
         *place += 1;
     }
+    // Sorted, for a hub's would be looked through once for every face at it; where several come into question the first is taken.
+    for s in starts.windows(2) {
+        leaving[s[0]..s[1]].sort_unstable_by_key(|&h| (ends(h).1, h));
+    }
     (0..count)
         .map(|h| {
             let (from, to) = ends(h);
-            let back = leaving[starts[to as usize]..starts[to as usize + 1]].iter();
-            let twin = back.copied().find(|&t| ends(t).1 == from)?;
+            let back = &leaving[starts[to as usize]..starts[to as usize + 1]];
+            let first = back.get(back.partition_point(|&t| ends(t).1 < from));
+            let twin = first.copied().filter(|&t| ends(t).1 == from)?;
             Some((twin / 3, twin % 3))
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::mesh::Vec3;
+
+    fn mesh(vertices: usize, faces: Vec<[u32; 3]>) -> TriMesh {
+        TriMesh {
+            positions: vec![Vec3::zeros(); vertices],
+            faces,
+        }
+    }
+
+    /// For every half-edge the first of all that runs the other way.
+    fn by_looking_through(faces: &[[u32; 3]]) -> Vec<Option<(usize, usize)>> {
+        let ends = |h: usize| (faces[h / 3][h % 3], faces[h / 3][(h % 3 + 1) % 3]);
+        let twin = |h: usize| {
+            let (from, to) = ends(h);
+            (0..3 * faces.len()).find(|t| ends(*t) == (to, from))
+        };
+        (0..3 * faces.len())
+            .map(|h| twin(h).map(|t| (t / 3, t % 3)))
+            .collect()
+    }
+
+    proptest! {
+        #[test]
+        fn half_edges_are_paired_as_by_looking_through_all(faces in prop::collection::vec(prop::array::uniform3(0u32..12), 1..60)) {
+            // Most such edges have more than two faces, some one end only.
+            let expected = by_looking_through(&faces);
+            prop_assert_eq!(neighbours(&mesh(12, faces)), expected);
+        }
+    }
+
+    #[test]
+    fn a_fan_round_a_hub_unfolds_to_a_disk() {
+        let spokes = 50_000u32;
+        let faces = (0..spokes).map(|k| [0, 1 + k, 1 + (k + 1) % spokes]);
+        let fan = mesh(spokes as usize + 1, faces.collect());
+        let spoke = |k: f64| {
+            let angle = std::f64::consts::TAU * k / f64::from(spokes);
+            Vec2::new(angle.cos(), angle.sin())
+        };
+        let slice = RestTriangle::from_corners([Vec2::zeros(), spoke(0.0), spoke(1.0)]);
+        let turns = rotations(&fan, &vec![slice; spokes as usize]);
+        for (k, turn) in (0..spokes).zip(turns) {
+            assert!((turn - spoke(f64::from(k))).norm() < 1e-9, "{k}");
+        }
+    }
 }
