@@ -58,6 +58,8 @@ struct Row {
     force: Vec<(usize, f64)>,
     /// The free vertices' part of where the point lies unpulled, and where it is to go.
     way: [Vec3; 2],
+    /// Share of its way that the point is to go.
+    share: f64,
     hold: Hold,
     /// Largest force.
     strength: f64,
@@ -90,8 +92,8 @@ pub(super) struct Pulls {
     /// A⁻¹Cᵀ, one column of free vertices per pull.
     response: Vec<Vec<f64>>,
     gram: Option<LU<f64, Dyn, Dyn>>,
-    /// Share of their ways that the points are to go.
-    share: f64,
+    /// How often they were eased.
+    easings: usize,
 }
 
 impl Pulls {
@@ -101,7 +103,7 @@ impl Pulls {
             rows: Vec::new(),
             response: Vec::new(),
             gram: None,
-            share: 1.0,
+            easings: 0,
         }
     }
 
@@ -139,7 +141,7 @@ impl Pulls {
             gram: Some(gram.lu()),
             rows,
             response,
-            share: 1.0,
+            easings: 0,
         })
     }
 
@@ -148,9 +150,20 @@ impl Pulls {
         self.rows.is_empty()
     }
 
-    /// Takes the points only this share as far as before.
+    /// Takes the points only this share as far as before. Where some are hard the soft ones give way alone, for a while, and at last
+    /// altogether: a strained pull at the rim is no reason to let go of one that must be met.
     pub fn ease(&mut self, share: f64) {
-        self.share *= share;
+        self.easings += 1;
+        let is_soft = |row: &Row| row.hold == Hold::Soft;
+        let mixed = self.rows.iter().any(is_soft) && !self.rows.iter().all(is_soft);
+        let (soft, hard) = match self.easings {
+            n if !mixed || n > SOFT_ALONE => (share, share),
+            SOFT_ALONE => (0.0, 1.0),
+            _ => (share, 1.0),
+        };
+        for row in &mut self.rows {
+            row.share *= if is_soft(row) { soft } else { hard };
+        }
     }
 
     /// Adds to a solution without pulls what their forces, as far as they are borne, do to it.
@@ -165,7 +178,7 @@ impl Pulls {
                 .iter()
                 .map(|(v, w)| Vec3::from(solution[*v]) * *w)
                 .sum();
-            let goal = row.way[0].lerp(&row.way[1], self.share);
+            let goal = row.way[0].lerp(&row.way[1], row.share);
             forces.set_row(k, &(goal - place).transpose());
         }
         if !gram.solve_mut(&mut forces) {
@@ -194,11 +207,14 @@ impl Row {
             terms,
             force: grip.finger.clone(),
             way,
+            share: 1.0,
             hold: grip.hold,
             strength: grip.hold.strength() * grip.radius,
         })
     }
 }
 
+/// Easings in which soft pulls give way alone.
+const SOFT_ALONE: usize = 3;
 /// Least weight of a pull's free corners.
 const LEAST_SHARE: f64 = 0.1;

@@ -197,6 +197,38 @@ fn a_hard_anchor_is_met_or_refused_with_the_numbers() {
 }
 
 #[test]
+fn a_soft_anchor_at_the_rim_gives_way_to_a_hard_one() {
+    let cloth = Edited::of(sheet(0));
+    let middle = cloth.vertex([0.0, 0.0]);
+    let hard = Anchor {
+        hard: true,
+        ..cloth.anchor(middle, cloth.across(middle) * 0.5 * cloth.cell)
+    };
+    let faces = cloth.session.described().holes[0].patch_faces.clone();
+    let inner = |face: &&[u32]| face.iter().filter(|v| **v as usize >= cloth.rim).count() == 1;
+    for face in faces.chunks_exact(3).filter(inner).step_by(5) {
+        // Nearly on the rim, and to be moved by half a cell: more than its one free vertex can do.
+        let share = |v: u32| if (v as usize) < cloth.rim { 0.44 } else { 0.12 };
+        let uv: Vec2 = face
+            .iter()
+            .map(|v| cloth.uvs[*v as usize] * share(*v))
+            .sum();
+        let at: Vec3 = face
+            .iter()
+            .map(|v| cloth.positions[*v as usize] * share(*v))
+            .sum();
+        let soft = Anchor {
+            hole: None,
+            uv: Some(uv.into()),
+            position: (at + cloth.across(middle) * 0.5 * cloth.cell).into(),
+            hard: false,
+        };
+        let (_, report) = (cloth.session.positions(&anchored(vec![hard, soft]))).unwrap();
+        assert!(report.holes[0].anchors[0].distance <= 1e-3 * cloth.extent);
+    }
+}
+
+#[test]
 fn gestures_compose_in_order() {
     let cloth = Edited::of(sheet(1));
     let vertex = cloth.vertex([0.1, 0.1]);
