@@ -90,6 +90,18 @@ impl<'d> Accessor<'d> {
         self.collect(0, |bytes| unsigned(bytes, self.component))
     }
 
+    /// All elements of VEC4 as they are stored; the caller has made sure of the type and that the component is u8 or u16.
+    pub fn quadruples(&self) -> Result<Vec<[u16; 4]>, ScanError> {
+        let step = self.component.size();
+        self.collect([0; 4], |bytes| {
+            let mut out = [0; 4];
+            for (slot, bytes) in out.iter_mut().zip(bytes.chunks_exact(step)) {
+                *slot = unsigned(bytes, self.component) as u16;
+            }
+            out
+        })
+    }
+
     fn collect<T: Copy>(&self, zero: T, read: impl Fn(&[u8]) -> T) -> Result<Vec<T>, ScanError> {
         let mut out = match &self.base {
             Some(base) => base.iter().take(self.count).map(&read).collect(),

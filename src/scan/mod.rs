@@ -2,8 +2,9 @@
 //! The only room that knows glTF. It opens no path and no URL, and trusts no count before it has seen the bytes behind it.
 //! No welding, no holes, no opinion about cloth: those are `mesh` and the rooms after it.
 //!
-//! Skins and morph targets are read in their bind pose as stored; a patch on a mesh with morph targets gets as many targets
-//! without displacement, and a patch on a skinned mesh carries no joints (it stands still when the skin moves).
+//! Skinned meshes are read in their bind pose: where their positions say, whatever their node's transform. A patch on one is moved by
+//! the joints that move the rim beside it. Morph targets are read at weight 0, even those that the file turns on
+//! ([`Scan::posed_by_morph_targets`] tells); a patch gets as many targets as its mesh has, without displacement.
 
 mod accessor;
 mod append;
@@ -16,6 +17,7 @@ mod read;
 #[cfg(test)]
 mod read_tests;
 mod scene;
+mod skin;
 mod splice;
 #[cfg(test)]
 pub(crate) mod testing;
@@ -37,6 +39,7 @@ pub use write::{Addition, PatchPoint};
 use crate::mesh::TriMesh;
 use container::Layout;
 use scene::Placement;
+use skin::{Influence, Influences};
 
 /// What a scan may cost. Every refusal names the field and its value.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -49,9 +52,9 @@ pub struct Limits {
     pub max_nodes: usize,
     /// Primitives of all drawn meshes together, instances counted, points and lines too.
     pub max_primitives: usize,
-    /// Numbers in all texture coordinate and colour sets together.
+    /// Numbers in all vertex attributes but positions together.
     pub max_attribute_values: usize,
-    /// Texture coordinate sets, and colour sets, of one primitive.
+    /// Texture coordinate sets, and colour sets, and sets of joints and weights, of one primitive.
     pub max_attribute_sets: usize,
     /// Values in the JSON, keys counted (an upper estimate, made before they are built).
     pub max_json_values: usize,
@@ -116,6 +119,8 @@ pub struct Part {
     targets: usize,
     color_kinds: Vec<Type>,
     placement: Placement,
+    /// JOINTS_0 and WEIGHTS_0, JOINTS_1 and WEIGHTS_1, …, as `texcoords`; `None` if no node draws the mesh with a skin.
+    skinning: Option<Vec<Influences>>,
 }
 
 /// A run of vertices and their stored positions.
@@ -161,7 +166,10 @@ impl Scan {
         let attributes = |part: &Part| {
             let texcoords: usize = part.texcoords.iter().map(|set| 8 * set.len()).sum();
             let colors: usize = part.colors.iter().map(|set| 16 * set.len()).sum();
-            texcoords + colors + part.normals.as_ref().map_or(0, |set| 12 * set.len())
+            let skinning = part.skinning.iter().flatten();
+            let skinning: usize = skinning.map(|set| size_of::<Influence>() * set.len()).sum();
+            let normals = part.normals.as_ref().map_or(0, |set| 12 * set.len());
+            texcoords + colors + normals + skinning
         };
         let parts: usize = self.parts.iter().map(attributes).sum();
         let surface = 24 * self.surface.positions.len() + 12 * self.surface.faces.len();
@@ -186,6 +194,22 @@ impl Scan {
         let name =
             |list: &str, index: usize| self.json.get(list)?.get(index)?.get("name")?.as_str();
         name("meshes", part.mesh).or_else(|| name("nodes", part.node))
+    }
+
+    /// Whether the file turns morph targets of a drawn mesh on by default: `surface` is then not what viewers show, and a patch on it
+    /// fits its rim only where the targets do not move that.
+    pub fn posed_by_morph_targets(&self) -> bool {
+        let weights = |list: &str, index: usize| {
+            let weights = self.json.get(list)?.get(index)?.get("weights")?;
+            weights.as_array()
+        };
+        let on = |weight: &Value| weight.as_f64().is_some_and(|weight| weight != 0.0);
+        self.parts.iter().any(|part| {
+            // A node's weights stand in for its mesh's (glTF 2.0, 3.7.2.2).
+            weights("nodes", part.node)
+                .or_else(|| weights("meshes", part.mesh))
+                .is_some_and(|weights| weights.iter().take(part.targets).any(on))
+        })
     }
 
     /// The node that a vertex of `surface` belongs to and its position as stored there.

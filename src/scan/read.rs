@@ -11,6 +11,7 @@ use super::accessor::{Accessor, is_unsigned};
 use super::buffers::Document;
 use super::json::{Place, values_at_most};
 use super::scene::{Drawn, drawn};
+use super::skin::{Influence, Influences, skinned_meshes};
 use super::triangles::Runs;
 use super::{Block, Limits, Part, Scan, ScanError};
 use crate::mesh::{TriMesh, Vec3};
@@ -115,6 +116,9 @@ struct Reader<'d, 'a> {
     /// Texture coordinate and colour sets by accessor: primitives and instances share them.
     texcoords: HashMap<usize, Uvs>,
     colors: HashMap<usize, (Type, Rgba)>,
+    /// Sets of joints and weights, likewise, by the accessors of both.
+    influences: HashMap<(usize, usize), Influences>,
+    skinned: BTreeSet<usize>,
     attribute_values: usize,
     primitives: usize,
     faces: usize,
@@ -131,6 +135,8 @@ impl<'d, 'a> Reader<'d, 'a> {
             met: BTreeSet::new(),
             texcoords: HashMap::new(),
             colors: HashMap::new(),
+            influences: HashMap::new(),
+            skinned: skinned_meshes(document.root.value),
             attribute_values: 0,
             primitives: 0,
             faces: 0,
@@ -215,6 +221,10 @@ impl<'d, 'a> Reader<'d, 'a> {
             self.texcoords(&attributes, count)?,
             self.colors(&attributes, count)?,
         );
+        let skinned = self.skinned.contains(&drawn.mesh);
+        let skinning = skinned
+            .then(|| self.influences(&attributes, count))
+            .transpose()?;
         let material = match place.get("material")? {
             Some(reference) => Some(self.document.root.referred("materials", &reference)?.0),
             None => None,
@@ -238,6 +248,7 @@ impl<'d, 'a> Reader<'d, 'a> {
                 .map_or(Ok(0), |targets| targets.array().map(<[_]>::len))?,
             color_kinds,
             placement: drawn.placement.clone(),
+            skinning,
         }))
     }
 
@@ -427,6 +438,63 @@ impl<'d, 'a> Reader<'d, 'a> {
             )?;
         }
         Ok((kinds, sets))
+    }
+
+    /// The sets of joints and weights, as far as both are there.
+    fn influences(
+        &mut self,
+        attributes: &Place<'a>,
+        vertices: usize,
+    ) -> Result<Vec<Influences>, ScanError> {
+        let mut sets = Vec::new();
+        while let (Some(joints), Some(weights)) = (
+            attributes.get(&format!("JOINTS_{}", sets.len()))?,
+            attributes.get(&format!("WEIGHTS_{}", sets.len()))?,
+        ) {
+            let (of_joints, joints) = self.document.root.referred("accessors", &joints)?;
+            let (of_weights, weights) = self.document.root.referred("accessors", &weights)?;
+            let key = (of_joints, of_weights);
+            let set = match self.influences.get(&key) {
+                Some(set) => Arc::clone(set),
+                None => {
+                    let set = self.weighted_joints(&joints, &weights, vertices)?;
+                    self.influences.insert(key, Arc::clone(&set));
+                    set
+                }
+            };
+            same_count(&joints, set.len(), vertices)?;
+            sets.push(set);
+            within(
+                self.limits.max_attribute_sets,
+                "max_attribute_sets",
+                sets.len(),
+                &attributes.pointer,
+            )?;
+        }
+        Ok(sets)
+    }
+
+    /// Decodes a JOINTS accessor and the WEIGHTS that go with it; negative weights read as 0.
+    fn weighted_joints(
+        &mut self,
+        joints: &Place<'a>,
+        weights: &Place<'a>,
+        vertices: usize,
+    ) -> Result<Influences, ScanError> {
+        let accessor = self.attribute(joints, &[Type::Vec4])?;
+        if ![ComponentType::U8, ComponentType::U16].contains(&accessor.component) {
+            return Err(joints.invalid("joints must be unsigned bytes or shorts"));
+        }
+        same_count(joints, accessor.count, vertices)?;
+        let of_joints = accessor.quadruples()?;
+        let accessor = self.attribute(weights, &[Type::Vec4])?;
+        same_count(weights, accessor.count, vertices)?;
+        let of_weights = accessor.floats([0.0; 4])?.into_iter();
+        let of_weights = of_weights.map(|weights| weights.map(|w| tame(w).max(0.0)));
+        let influences = of_joints.into_iter().zip(of_weights);
+        Ok(influences
+            .map(|(joints, weights)| Influence { joints, weights })
+            .collect())
     }
 
     /// Opens a vertex attribute and counts its values against the limit.

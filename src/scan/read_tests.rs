@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
+use super::skin::Influence;
 use super::testing::Builder;
 use super::{Container, Limits, Scan, ScanError};
 use crate::mesh::Vec3;
@@ -150,6 +151,105 @@ fn transforms_accumulate_and_mirrors_turn_faces() {
     // Corner (1, 0, 0): turned to (0, −1, 0), shifted to (1, −1, 0), then by the matrix to (2, 2, …).
     assert!((scan.surface.positions[1] - Vec3::new(2.0, 2.0, 123456.789012345)).norm() < 1e-12);
     assert_eq!(scan.surface.faces, [[0, 2, 1], [0, 3, 2]]);
+}
+
+#[test]
+fn a_skinned_mesh_stands_where_its_positions_say_and_its_nodes_children_where_the_node_does() {
+    let mut scan = Builder::skinned();
+    scan.json["nodes"][0]["children"] = json!([3]);
+    scan.push("nodes", json!({"mesh": 0}));
+    let scan = read(&scan.glb()).unwrap();
+    assert_eq!(scan.surface.positions[2], Vec3::new(1.0, 1.0, 0.0));
+    assert_eq!(scan.surface.positions[6], Vec3::new(11.0, 1.0, 0.0));
+    assert_eq!(
+        scan.surface.faces,
+        [[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]],
+        "only the child is mirrored"
+    );
+}
+
+#[test]
+fn joint_and_weight_types_decode() {
+    let mut scan = Builder::skinned();
+    // Shorts with a gap after each four; weights that are all sparse.
+    let joints: Vec<u8> = [0_u16, 700, 2, 3, 9, 9]
+        .repeat(4)
+        .iter()
+        .flat_map(|j| j.to_le_bytes())
+        .collect();
+    let joints = scan.accessor(&joints, 5123, "VEC4", 4);
+    let view = scan.json["accessors"][joints]["bufferView"]
+        .as_u64()
+        .unwrap() as usize;
+    scan.json["bufferViews"][view]["byteStride"] = json!(12);
+    let indices = scan.view(&[0, 3]);
+    let values = scan.view(&[255, 0, 0, 0, 51, 204, 0, 0]);
+    let weights = json!({"componentType": 5121, "type": "VEC4", "count": 4, "normalized": true, "sparse": {"count": 2,
+        "indices": {"bufferView": indices, "componentType": 5121}, "values": {"bufferView": values}}});
+    let weights = scan.push("accessors", weights);
+    scan.json["meshes"][0]["primitives"][0]["attributes"] =
+        json!({"POSITION": 0, "JOINTS_0": joints, "WEIGHTS_0": weights});
+    let scan = read(&scan.glb()).unwrap();
+    let sets = scan.parts[0].skinning.as_ref().unwrap();
+    let joints = [0, 700, 2, 3];
+    let with = |weights| Influence { joints, weights };
+    assert_eq!(sets.len(), 1);
+    assert_eq!(
+        *sets[0],
+        [
+            with([1.0, 0.0, 0.0, 0.0]),
+            with([0.0; 4]),
+            with([0.0; 4]),
+            with([0.2, 0.8, 0.0, 0.0])
+        ]
+    );
+}
+
+#[test]
+fn joints_and_weights_that_are_none_are_named() {
+    let cases = [
+        ("/accessors/2", "componentType", json!(5120)),
+        ("/accessors/2", "count", json!(3)),
+        ("/accessors/3", "type", json!("VEC3")),
+        ("/accessors/3", "count", json!(3)),
+    ];
+    for (pointer, key, value) in cases {
+        let mut scan = Builder::skinned();
+        scan.json.pointer_mut(pointer).unwrap()[key] = value;
+        let error = read(&scan.glb()).unwrap_err();
+        assert_eq!(error.pointer(), Some(pointer), "{error}");
+    }
+    let tight = Limits {
+        max_attribute_values: 31,
+        ..Limits::default()
+    };
+    let error = Scan::read(&Builder::skinned().glb(), &tight).unwrap_err();
+    assert!(
+        error.to_string().contains("max_attribute_values = 31"),
+        "{error}"
+    );
+}
+
+#[test]
+fn morph_targets_that_are_on_by_default_are_told() {
+    let posed = |mesh: Value, node: Value, targets: usize| {
+        let mut scan = Builder::square();
+        scan.json["meshes"][0]["weights"] = mesh;
+        scan.json["nodes"][0]["weights"] = node;
+        scan.json["meshes"][0]["primitives"][0]["targets"] =
+            json!(vec![json!({"POSITION": 0}); targets]);
+        read(&scan.glb()).unwrap().posed_by_morph_targets()
+    };
+    let none = || Value::Null;
+    assert!(!posed(none(), none(), 2));
+    assert!(!posed(json!([0, 0.0]), none(), 2));
+    assert!(posed(json!([0, 0.5]), none(), 2));
+    assert!(posed(none(), json!([-1, 0]), 2));
+    assert!(
+        !posed(json!([1, 1]), json!([0, 0]), 2),
+        "a node's weights count in place of its mesh's"
+    );
+    assert!(!posed(json!([0, 1]), none(), 1), "no such target");
 }
 
 #[test]

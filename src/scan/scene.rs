@@ -67,7 +67,7 @@ impl Placement {
 /// The drawn meshes of the default scene, depth first in the file's order.
 ///
 /// Without `scene` the first scene is taken, without scenes every node that is nobody's child. Skins are not applied: a skinned
-/// mesh stands in its bind pose, as stored, under its node's transform; morph targets likewise have weight 0.
+/// mesh stands in its bind pose, as stored, untouched by its node's transform; morph targets likewise have weight 0.
 pub(super) fn drawn(root: &Place<'_>, limits: &Limits) -> Result<Vec<Drawn>, ScanError> {
     let nodes = match root.get("nodes")? {
         Some(nodes) => nodes.array()?.len(),
@@ -106,10 +106,15 @@ pub(super) fn drawn(root: &Place<'_>, limits: &Limits) -> Result<Vec<Drawn>, Sca
         let placement = parent.then(&local(&node)?);
         if let Some(reference) = node.get("mesh")? {
             let (mesh, _) = root.referred("meshes", &reference)?;
+            // Only its joints move a skinned mesh (glTF 2.0, 3.7.3.3).
+            let placement = match node.get("skin")? {
+                Some(_) => Placement::identity(),
+                None => placement.clone(),
+            };
             out.push(Drawn {
                 node: index,
                 mesh,
-                placement: placement.clone(),
+                placement,
             });
         }
         if let Some(children) = node.get("children")? {

@@ -48,6 +48,29 @@ impl Builder {
         out
     }
 
+    /// The unit square under a skin of two joints, the second of which draws most at the corner (1, 0, 0); its node stands elsewhere.
+    pub fn skinned() -> Self {
+        let mut out = Self::square();
+        let joints = out.accessor(&[0_u8, 1, 0, 0].repeat(4), 5121, "VEC4", 4);
+        let weights = out.floats(&[
+            [1.0, 0.0, 0.0, 0.0],
+            [0.25, 0.75, 0.0, 0.0],
+            [0.5, 0.5, 0.0, 0.0],
+            [0.9, 0.1, 0.0, 0.0],
+        ]);
+        let attributes = &mut out.json["meshes"][0]["primitives"][0]["attributes"];
+        attributes["JOINTS_0"] = json!(joints);
+        attributes["WEIGHTS_0"] = json!(weights);
+        out.json["nodes"] = json!([
+            {"mesh": 0, "skin": 0, "translation": [10, 0, 0], "scale": [1, 1, -1]},
+            {"children": [2]},
+            {},
+        ]);
+        out.json["scenes"][0]["nodes"] = json!([0, 1]);
+        out.json["skins"] = json!([{"joints": [1, 2]}]);
+        out
+    }
+
     /// Appends a buffer view; its index.
     pub fn view(&mut self, bytes: &[u8]) -> usize {
         self.bin.resize(self.bin.len().next_multiple_of(4), 0);

@@ -7,13 +7,14 @@ use gltf::json::mesh::TRIANGLES;
 use serde_json::{Map, Value, json};
 
 use super::append::{Appender, Content, Target};
+use super::skin::{self, Influence};
 use super::{Part, Scan, ScanError};
 use crate::mesh::Vec3;
 
 /// A patch to append to the scan as a primitive of its own.
 ///
 /// Its attributes follow the part whose material it takes: with normals if that has them, and as many texture coordinate and
-/// colour sets, each `[points.len()]`.
+/// colour sets, each `[points.len()]`. What moves it on a skinned mesh comes from the scan's vertices among its points.
 #[derive(Debug, Clone)]
 pub struct Addition {
     /// Index into `Scan::parts` of a part of the mesh and node that take the patch.
@@ -124,6 +125,8 @@ struct Patch<'s> {
     look: &'s Part,
     /// Positions in the node's space.
     points: Vec<[f32; 3]>,
+    /// Sets of joints and weights; none if the mesh has no skin.
+    skinning: Vec<Vec<Influence>>,
 }
 
 impl<'s> Patch<'s> {
@@ -214,11 +217,16 @@ impl<'s> Patch<'s> {
             }
             points.push(local);
         }
+        let skinning = match home.skinning {
+            Some(_) => skin::carried(scan, home, &addition.points, &points),
+            None => Vec::new(),
+        };
         Ok(Self {
             addition,
             home,
             look,
             points,
+            skinning,
         })
     }
 
@@ -273,6 +281,12 @@ impl<'s> Patch<'s> {
             };
             attributes.insert(format!("COLOR_{n}"), floats(out, *kind, bytes, None));
         }
+        for (n, set) in self.skinning.iter().enumerate() {
+            let weights: Vec<_> = set.iter().map(|influence| influence.weights).collect();
+            let weights = floats(out, Type::Vec4, bytes_of(&weights), None);
+            attributes.insert(format!("JOINTS_{n}"), self.joints(out, set));
+            attributes.insert(format!("WEIGHTS_{n}"), weights);
+        }
         let targets = if self.home.targets > 0 {
             // All primitives of a mesh must have as many targets; this one does not move with any.
             let still = vec![[0.0; 3]; self.points.len()];
@@ -293,6 +307,19 @@ impl<'s> Patch<'s> {
         }
         primitive.insert("extras".into(), json!({ "darn": addition.extras }));
         Value::Object(primitive)
+    }
+
+    /// Appends the joints of one set.
+    fn joints(&self, out: &mut Appender<'_>, set: &[Influence]) -> Value {
+        let joints = set.iter().flat_map(|influence| influence.joints);
+        out.accessor(Content {
+            name: &self.addition.name,
+            target: Target::Vertices,
+            component: ComponentType::U16,
+            kind: Type::Vec4,
+            bytes: joints.flat_map(u16::to_le_bytes).collect(),
+            bounds: None,
+        })
     }
 
     /// Normals in the node's space, unit: the transpose of its linear part undoes the inverse transpose that renderers apply.

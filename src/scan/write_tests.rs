@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
+use super::skin::Influence;
 use super::testing::Builder;
 use super::{Addition, Limits, PatchPoint, Scan, ScanError};
 use crate::mesh::Vec3;
@@ -231,6 +232,108 @@ fn morph_targets_are_as_many_and_do_not_move_the_patch() {
         (still["count"].as_u64(), &still["max"]),
         (Some(4), &json!([0.0, 0.0, 0.0]))
     );
+}
+
+/// The sets of joints and weights of the last part.
+fn sets(bytes: &[u8]) -> Vec<Vec<Influence>> {
+    let scan = read(bytes);
+    let sets = scan.parts.last().unwrap().skinning.as_ref().unwrap();
+    sets.iter().map(|set| set.to_vec()).collect()
+}
+
+#[test]
+fn a_patch_on_a_skinned_mesh_is_moved_as_the_rim_beside_it() {
+    let bytes = Builder::skinned().glb();
+    let scan = read(&bytes);
+    // Nearest to the corner (1, 0, 0), where the skin's positions are.
+    let top = Vec3::new(0.9, 0.2, 0.125);
+    let out = scan.write(&[tent(&scan, 0, top)]).unwrap();
+    let sets = sets(&out);
+    let [set] = &sets[..] else {
+        panic!("one set, as the rim has")
+    };
+    let own = &scan.parts[0].skinning.as_ref().unwrap()[0];
+    assert_eq!(set[..], [own[0], own[1], own[2], own[1]]);
+
+    let document = gltf::Gltf::from_slice(&out).unwrap().document;
+    let mesh = document.meshes().next().unwrap();
+    let primitive = mesh.primitives().last().unwrap();
+    for (semantic, component) in [
+        (gltf::Semantic::Joints(0), gltf::accessor::DataType::U16),
+        (gltf::Semantic::Weights(0), gltf::accessor::DataType::F32),
+    ] {
+        let accessor = primitive.get(&semantic).unwrap();
+        assert_eq!((accessor.count(), accessor.data_type()), (4, component));
+        assert_eq!(accessor.dimensions(), gltf::accessor::Dimensions::Vec4);
+    }
+    let (positions, _) = witness(&out);
+    assert_eq!(positions[3], [0.9, 0.2, 0.125], "in the mesh's own space");
+    let ((old, old_bin), (new, new_bin)) = (parsed(&bytes), parsed(&out));
+    kept(&old, &new, "", &["/buffers/0/byteLength"]);
+    assert_eq!(&new_bin[..old_bin.len()], &old_bin);
+}
+
+#[test]
+fn weights_of_a_patch_sum_to_one_over_all_sets() {
+    let mut scan = Builder::skinned();
+    let none = [0.0_f32; 4];
+    let first = [[0.5, 0.5, 0.0, 0.0], none, [0.7, 0.0, 0.0, 0.0], none];
+    let second = [[1.0, 0.0, 0.0, 0.0], none, [0.1, 0.2, 0.0, 0.0], none];
+    let (first, second) = (scan.floats(&first), scan.floats(&second));
+    let joints = scan.accessor(&[2_u8, 3, 0, 0].repeat(4), 5121, "VEC4", 4);
+    let attributes = &mut scan.json["meshes"][0]["primitives"][0]["attributes"];
+    attributes["WEIGHTS_0"] = json!(first);
+    attributes["JOINTS_1"] = json!(joints);
+    attributes["WEIGHTS_1"] = json!(second);
+    let scan = read(&scan.glb());
+    let out = scan.write(&[tent(&scan, 0, Vec3::z())]).unwrap();
+    let sets = sets(&out);
+    let [first, second] = &sets[..] else {
+        panic!("both sets")
+    };
+    let weights = |k: usize| (first[k].weights, second[k].weights);
+    assert_eq!(
+        weights(0),
+        ([0.25, 0.25, 0.0, 0.0], [0.5, 0.0, 0.0, 0.0]),
+        "they summed to 2"
+    );
+    assert_eq!(
+        weights(1),
+        ([1.0, 0.0, 0.0, 0.0], none),
+        "there were none at all"
+    );
+    assert_eq!(
+        weights(2),
+        ([0.7, 0.0, 0.0, 0.0], [0.1, 0.2, 0.0, 0.0]),
+        "they sum to 1 up to rounding and keep their bits"
+    );
+    assert_eq!(weights(3), weights(0), "the nearest vertex gives both sets");
+    assert_eq!(
+        (first[3].joints, second[3].joints),
+        ([0, 1, 0, 0], [2, 3, 0, 0])
+    );
+}
+
+#[test]
+fn a_mesh_that_any_node_skins_gets_patches_with_joints_and_others_do_not() {
+    let mut scan = Builder::square();
+    scan.json["nodes"] = json!([{"mesh": 0}, {"mesh": 0, "skin": 0}, {}]);
+    scan.json["skins"] = json!([{"joints": [2]}]);
+    let scan = read(&scan.glb());
+    let out = scan.write(&[tent(&scan, 0, Vec3::z())]).unwrap();
+    let first = Influence {
+        joints: [0; 4],
+        weights: [1.0, 0.0, 0.0, 0.0],
+    };
+    assert_eq!(sets(&out), [[first; 4]], "its primitive says nothing");
+
+    let mut scan = Builder::skinned();
+    let node = scan.json["nodes"][0].as_object_mut().unwrap();
+    node.remove("skin");
+    let scan = read(&scan.glb());
+    let (json, _) = parsed(&scan.write(&[tent(&scan, 0, Vec3::z())]).unwrap());
+    let attributes = &json["meshes"][0]["primitives"][1]["attributes"];
+    assert_eq!(attributes.as_object().unwrap().len(), 1);
 }
 
 #[test]
