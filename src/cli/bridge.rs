@@ -1,9 +1,9 @@
 //! What the service is given to mend with: reads the scan, mends it, and sorts refusals by whose fault they are.
 
 use darn::contract::{Constraints, Search, v1};
-use darn::mend::{self, MendError, Mender, Session};
+use darn::mend::{self, Call, MendError, Mender, Session};
 use darn::scan::{Limits, Scan, ScanError};
-use darn::serve::{Class, Kept, Mended, Menders, PatchForm, Patches, Refusal};
+use darn::serve::{Class, Kept, Mended, Menders, PatchForm, Patches, Refusal, Wanted};
 use std::error::Error;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -26,33 +26,58 @@ impl Bridge {
         let scan = Scan::read(bytes, &self.limits).map_err(|error| of_scan(&error))?;
         Ok((scan, started.elapsed()))
     }
+
+    fn call<'a>(&'a self, wanted: Wanted<'a>) -> Call<'a> {
+        let mender = &self.mender;
+        Call { mender, wanted }
+    }
 }
 
 impl Menders for Bridge {
-    fn inpaint(&self, scan: &[u8], constraints: &Constraints) -> Result<Mended, Refusal> {
+    fn inpaint(
+        &self,
+        scan: &[u8],
+        constraints: &Constraints,
+        wanted: Wanted<'_>,
+    ) -> Result<Mended, Refusal> {
         let (scan, read) = self.scan(scan)?;
-        let mended = mend::mend(&scan, constraints, &self.mender);
+        let mended = mend::mend(&scan, constraints, self.call(wanted));
         mended
             .map(|m| passed(m.with_read_time(read)))
             .map_err(of_mend)
     }
 
-    fn optimize_anchor(&self, scan: &[u8], search: &Search) -> Result<v1::AnchorFound, Refusal> {
+    fn optimize_anchor(
+        &self,
+        scan: &[u8],
+        search: &Search,
+        wanted: Wanted<'_>,
+    ) -> Result<v1::AnchorFound, Refusal> {
         let (scan, _) = self.scan(scan)?;
-        mend::optimize_anchor(&scan, search, &self.mender).map_err(of_mend)
+        mend::optimize_anchor(&scan, search, self.call(wanted)).map_err(of_mend)
     }
 
-    fn mend_to_target(&self, scan: &[u8], search: &Search) -> Result<Mended, Refusal> {
+    fn mend_to_target(
+        &self,
+        scan: &[u8],
+        search: &Search,
+        wanted: Wanted<'_>,
+    ) -> Result<Mended, Refusal> {
         let (scan, read) = self.scan(scan)?;
-        let mended = mend::mend_to_target(&scan, search, &self.mender);
+        let mended = mend::mend_to_target(&scan, search, self.call(wanted));
         mended
             .map(|m| passed(m.with_read_time(read)))
             .map_err(of_mend)
     }
 
-    fn open(&self, scan: &[u8], constraints: &Constraints) -> Result<Box<dyn Kept>, Refusal> {
+    fn open(
+        &self,
+        scan: &[u8],
+        constraints: &Constraints,
+        wanted: Wanted<'_>,
+    ) -> Result<Box<dyn Kept>, Refusal> {
         let (scan, _) = self.scan(scan)?;
-        let session = Session::open(scan, constraints, Arc::clone(&self.mender));
+        let session = Session::open_while(wanted, scan, constraints, Arc::clone(&self.mender));
         Ok(Box::new(Held(session.map_err(of_mend)?)))
     }
 
@@ -67,7 +92,8 @@ impl Menders for Bridge {
     }
 
     fn warm_up(&self) -> Result<(), Refusal> {
-        self.inpaint(EXAMPLE, &Constraints::default()).map(drop)
+        self.inpaint(EXAMPLE, &Constraints::default(), &|| true)
+            .map(drop)
     }
 }
 
@@ -83,11 +109,17 @@ impl Kept for Held {
         self.0.bytes()
     }
 
-    fn patches(&self, constraints: &Constraints, form: PatchForm) -> Result<Patches, Refusal> {
+    fn patches(
+        &self,
+        constraints: &Constraints,
+        form: PatchForm,
+        wanted: Wanted<'_>,
+    ) -> Result<Patches, Refusal> {
+        let turn = self.0.turn(wanted);
         let (bytes, report) = match form {
-            PatchForm::Glb => self.0.glb(constraints).map_err(of_mend)?,
+            PatchForm::Glb => turn.glb(constraints).map_err(of_mend)?,
             PatchForm::Positions => {
-                let (positions, report) = self.0.positions(constraints).map_err(of_mend)?;
+                let (positions, report) = turn.positions(constraints).map_err(of_mend)?;
                 let numbers = positions.iter().flatten().flat_map(|p| [p.x, p.y, p.z]);
                 let bytes = numbers.flat_map(|x| (x as f32).to_le_bytes());
                 (bytes.collect(), report)
@@ -96,12 +128,18 @@ impl Kept for Held {
         Ok(Patches { bytes, report })
     }
 
-    fn mended(&self, constraints: &Constraints) -> Result<Mended, Refusal> {
-        self.0.mended(constraints).map(passed).map_err(of_mend)
+    fn mended(&self, constraints: &Constraints, wanted: Wanted<'_>) -> Result<Mended, Refusal> {
+        let mended = self.0.turn(wanted).mended(constraints);
+        mended.map(passed).map_err(of_mend)
     }
 
-    fn optimize_anchor(&self, search: &Search) -> Result<v1::AnchorFound, Refusal> {
-        self.0.optimize_anchor(search).map_err(of_mend)
+    fn optimize_anchor(
+        &self,
+        search: &Search,
+        wanted: Wanted<'_>,
+    ) -> Result<v1::AnchorFound, Refusal> {
+        let found = self.0.turn(wanted).optimize_anchor(search);
+        found.map_err(of_mend)
     }
 }
 

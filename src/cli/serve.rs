@@ -19,6 +19,7 @@ pub fn run(settings: &ServeArgs) -> Result<(), Failure> {
     let mender = network::mender(&settings.network)?;
     let limits = Limits {
         max_faces: settings.max_faces,
+        max_vertices: settings.max_vertices,
         ..Limits::default()
     };
     darn::serve::run(

@@ -83,10 +83,11 @@ impl Cloth {
         }
     }
 
-    /// Whether the mesh a loop lies on is drawn here for the first time: a patch on a mesh shows at every node that draws it.
+    /// Whether the meshes a loop lies on are drawn here for the first time, all along it: a patch on a mesh shows at every node that
+    /// draws it.
     pub fn on_first_instance(&self, scan: &Scan, rim: &BoundaryLoop) -> bool {
-        let part = (rim.half_edges.first()).and_then(|h| self.source(scan, h / 3));
-        part.is_none_or(|(part, _)| scan.parts[part].first_instance)
+        let mut parts = rim.half_edges.iter().map(|h| self.source(scan, h / 3));
+        parts.all(|part| part.is_none_or(|(part, _)| scan.parts[part].first_instance))
     }
 
     /// What a person should know about the scan as a whole.
@@ -115,6 +116,12 @@ impl Cloth {
         if scan.parts.iter().any(|p| p.shared) {
             notes.push(
                 "a mesh is drawn by several nodes; a patch on it shows at each of them".to_owned(),
+            );
+        }
+        if scan.posed_by_morph_targets() {
+            notes.push(
+                "morph targets move the scan by default; it was mended as it lies without them, and the new cloth does not move with them"
+                    .to_owned(),
             );
         }
         notes

@@ -22,6 +22,16 @@ pub enum MendError {
         /// Its loops and why they are left as they are.
         skipped: Vec<v1::Skipped>,
     },
+    /// More holes than are filled at once.
+    #[error(
+        "{found} holes are to be filled, and at most {limit} are at once; choose among them by `holes`"
+    )]
+    TooManyHoles {
+        /// Holes to fill.
+        found: usize,
+        /// How many are filled at once.
+        limit: usize,
+    },
     /// The hole's rim runs through an edge that more than two triangles share.
     #[error("hole {hole} runs through non-manifold edges; its rim is not a single closed line")]
     NonManifold {
@@ -76,6 +86,9 @@ pub enum MendError {
     /// The patches could not be written.
     #[error("the patches could not be written: {0}")]
     Scan(#[from] ScanError),
+    /// Nobody waits for the answer any more.
+    #[error("nobody waits for the answer any more")]
+    Abandoned,
     /// A picture could not be encoded.
     #[error("a picture could not be encoded: {0}")]
     Picture(image::ImageError),
@@ -88,6 +101,7 @@ impl MendError {
             MendError::Constraints(_) => "constraints_do_not_fit",
             MendError::OutOfReach(_) => "anchor_out_of_reach",
             MendError::NoHoles { .. } => "no_holes",
+            MendError::TooManyHoles { .. } => "too_many_holes",
             MendError::NonManifold { .. } => "non_manifold_rim",
             MendError::Region {
                 source: RegionError::TooLarge { .. },
@@ -103,7 +117,10 @@ impl MendError {
             MendError::Patch { .. } => "patch_degenerate",
             MendError::Scan(ScanError::Singular { .. }) => "singular_transform",
             MendError::NoCells { .. } => "hole_too_narrow",
-            MendError::Net(_) | MendError::Scan(_) | MendError::Picture(_) => "internal",
+            MendError::Net(_)
+            | MendError::Scan(_)
+            | MendError::Picture(_)
+            | MendError::Abandoned => "internal",
         }
     }
 

@@ -2,6 +2,8 @@
 
 use std::time::Instant;
 
+use rstar::{PointDistance as _, RTree};
+
 use super::cloth::{Cloth, kind};
 use super::inpainter::Inpainter;
 use super::prepared::{Prepared, Unedited};
@@ -10,11 +12,14 @@ use super::wishes::Wishes;
 use super::{Limits, MendError, fill, milliseconds};
 use crate::contract::v1;
 use crate::mesh::Vec3;
+use crate::mesh::loops::LoopKind;
 use crate::patch::quality::{self, Quality};
 use crate::patch::{self, Patch, Pull};
 
 /// Largest stretch of an edge, of chart or patch, that goes without a note.
 const SUSPICIOUS: f64 = 1.5;
+/// A loose piece whose border keeps this near to new cloth, in edges of the hole's rim, lies in the hole.
+const IN_THE_HOLE: f64 = 1.5;
 /// How often less and less of a move is tried before the pulls alone draw the cloth.
 const TRIES: usize = 2;
 
@@ -118,6 +123,7 @@ pub fn described(filled: Filled, cloth: &Cloth) -> Result<Made, MendError> {
     let quality = quality::measure(&patch, &prepared.region);
     timings.report = milliseconds(started);
     let mut notes = notes(prepared, &quality);
+    notes.extend(covered(prepared, &patch, cloth));
     notes.extend(wishes.notes(&anchors));
     let rim = &cloth.loops[prepared.id as usize];
     let report = v1::HoleReport {
@@ -163,6 +169,36 @@ fn patch_report(patch: &Patch, quality: &Quality) -> v1::PatchReport {
         }
         .to_owned(),
     }
+}
+
+/// A note on loose pieces of the scan that lie where the new cloth is: a chart of the cloth around the hole does not know of them.
+fn covered(prepared: &Prepared, patch: &Patch, cloth: &Cloth) -> Option<String> {
+    let rim = &cloth.loops[prepared.id as usize];
+    let others =
+        (cloth.loops.iter()).filter(|l| l.kind == LoopKind::Outer && l.component != rim.component);
+    let mut others = others.peekable();
+    others.peek()?;
+    let near = IN_THE_HOLE * rim.length / rim.vertices.len().max(1) as f64;
+    let tree = RTree::bulk_load(
+        patch
+            .positions
+            .iter()
+            .map(|p| <[f64; 3]>::from(*p))
+            .collect(),
+    );
+    let is_near = |v: &u32| {
+        let place = <[f64; 3]>::from(cloth.welded.mesh.positions[*v as usize]);
+        let nearest = tree.nearest_neighbor(&place);
+        nearest.is_some_and(|p| p.distance_2(&place) <= near * near)
+    };
+    let inside = others.filter(|l| l.vertices.iter().all(is_near));
+    let pieces: Vec<String> = inside.map(|l| l.id.to_string()).collect();
+    (!pieces.is_empty()).then(|| {
+        format!(
+            "loose piece(s) of the scan lie in the hole (their borders: loop {}); they were kept, and the new cloth covers their place, too",
+            pieces.join(", ")
+        )
+    })
 }
 
 /// What a person should look at before trusting the patch.

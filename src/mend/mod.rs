@@ -18,6 +18,7 @@ mod select;
 mod session;
 mod wishes;
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::contract::{Anchor, Constraints, Search, v1};
@@ -29,7 +30,7 @@ use cloth::Cloth;
 pub use error::MendError;
 pub use fill::Response;
 use opened::Opened;
-pub use session::Session;
+pub use session::{Session, Turn};
 
 /// darn's version, as the report and the patches carry it.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -56,6 +57,8 @@ pub struct Limits {
     pub search: edit::Options,
     /// Cells an anchor search looks at before it sets out.
     pub seeds: usize,
+    /// Holes filled at once: each holds its chart, its grid and its patch until the last is done.
+    pub holes: usize,
 }
 
 impl Default for Limits {
@@ -66,6 +69,7 @@ impl Default for Limits {
             response: Response::default(),
             search: edit::Options::default(),
             seeds: 16,
+            holes: 1000,
         }
     }
 }
@@ -90,34 +94,79 @@ impl Mended {
     }
 }
 
+/// Whether anybody still waits for the answer. Asked before each hole and each step of a search, from any thread.
+pub type Wanted<'a> = &'a (dyn Fn() -> bool + Sync);
+
+/// What mends, for somebody who may go away before it is done. Made of a [`Mender`] alone it is for somebody who stays.
+#[derive(Clone, Copy)]
+pub struct Call<'a> {
+    /// What mends.
+    pub mender: &'a Mender,
+    /// Whether it is still waited for.
+    pub wanted: Wanted<'a>,
+}
+
+/// # Errors
+/// `Abandoned` when nobody waits any more.
+fn go_on(wanted: Wanted) -> Result<(), MendError> {
+    match wanted() {
+        true => Ok(()),
+        false => Err(MendError::Abandoned),
+    }
+}
+
+impl<'a> From<&'a Mender> for Call<'a> {
+    fn from(mender: &'a Mender) -> Self {
+        let wanted = &|| true;
+        Call { mender, wanted }
+    }
+}
+
+impl<'a> From<&'a Arc<Mender>> for Call<'a> {
+    fn from(mender: &'a Arc<Mender>) -> Self {
+        Call::from(&**mender)
+    }
+}
+
 /// Fills the holes of a scan that the constraints ask for; by default all of them, never an outer boundary or a tube's end.
 ///
 /// # Errors
-/// When a constraint does not fit the scan, or when a hole asked for cannot be filled, or when there is none.
-pub fn mend(scan: &Scan, constraints: &Constraints, mender: &Mender) -> Result<Mended, MendError> {
-    Opened::new(scan, constraints, mender)?.mended(scan, constraints, mender)
+/// When a constraint does not fit the scan, or when a hole asked for cannot be filled, or when there is none; `Abandoned`.
+pub fn mend<'a>(
+    scan: &Scan,
+    constraints: &Constraints,
+    call: impl Into<Call<'a>>,
+) -> Result<Mended, MendError> {
+    let call = call.into();
+    Opened::new(scan, constraints, call)?.mended(scan, constraints, call)
 }
 
 /// Searches where on a hole's grid a point in space belongs: the cell where an anchor at that point is best followed by the cloth.
 ///
 /// # Errors
-/// When the hole is not there, cannot be laid flat, or is not named among several.
-pub fn optimize_anchor(
+/// When the hole is not there, cannot be laid flat, or is not named among several; `Abandoned`.
+pub fn optimize_anchor<'a>(
     scan: &Scan,
     search: &Search,
-    mender: &Mender,
+    call: impl Into<Call<'a>>,
 ) -> Result<v1::AnchorFound, MendError> {
-    Opened::for_search(scan, search, mender)?.search(search, mender)
+    let call = call.into();
+    Opened::for_search(scan, search, call)?.search(search, call)
 }
 
 /// Searches, and fills all holes with an anchor at the place that was found.
 ///
 /// # Errors
 /// As [`optimize_anchor`] and [`mend`].
-pub fn mend_to_target(scan: &Scan, search: &Search, mender: &Mender) -> Result<Mended, MendError> {
-    let opened = Opened::new(scan, &Constraints::default(), mender)?;
-    let found = opened.search(search, mender)?;
-    opened.mended(scan, &anchor_of(&found, search), mender)
+pub fn mend_to_target<'a>(
+    scan: &Scan,
+    search: &Search,
+    call: impl Into<Call<'a>>,
+) -> Result<Mended, MendError> {
+    let call = call.into();
+    let opened = Opened::new(scan, &Constraints::default(), call)?;
+    let found = opened.search(search, call)?;
+    opened.mended(scan, &anchor_of(&found, search), call)
 }
 
 /// What a search found, as constraints: a soft anchor at its target.

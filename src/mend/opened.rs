@@ -10,7 +10,7 @@ use super::hole::{self, Filled, Made};
 use super::inpainter::Inpainter;
 use super::prepared::Prepared;
 use super::select::{Chosen, Selection, select};
-use super::{MendError, Mended, Mender, VERSION, dress, milliseconds, search};
+use super::{Call, MendError, Mended, Mender, VERSION, dress, go_on, milliseconds, search};
 use crate::contract::{Constraints, FieldError, Search, v1};
 use crate::scan::{Addition, Scan};
 
@@ -43,20 +43,22 @@ impl Opened {
     ///
     /// # Errors
     /// When a constraint does not fit the scan, when there is no hole, or one that cannot be laid flat.
-    pub fn new(scan: &Scan, asked: &Constraints, mender: &Mender) -> Result<Opened, MendError> {
-        Self::of(Cloth::of(scan), scan, asked, mender)
+    pub fn new(scan: &Scan, asked: &Constraints, call: Call) -> Result<Opened, MendError> {
+        Self::of(Cloth::of(scan), scan, asked, call)
     }
 
-    fn of(
-        cloth: Cloth,
-        scan: &Scan,
-        asked: &Constraints,
-        mender: &Mender,
-    ) -> Result<Opened, MendError> {
+    fn of(cloth: Cloth, scan: &Scan, asked: &Constraints, call: Call) -> Result<Opened, MendError> {
         let selection = select(scan, &cloth, asked)?;
-        chosen_inpainter(asked, mender)?;
+        let (found, limit) = (selection.chosen.len(), call.mender.limits.holes);
+        if found > limit {
+            return Err(MendError::TooManyHoles { found, limit });
+        }
+        chosen_inpainter(asked, call.mender)?;
         let started = Instant::now();
-        let prepare = |c: &Chosen| Prepared::new(&cloth, c.id, &mender.limits);
+        let prepare = |c: &Chosen| {
+            go_on(call.wanted)?;
+            Prepared::new(&cloth, c.id, &call.mender.limits)
+        };
         // In two steps: of several errors the first hole's is told, whichever was found first.
         let holes: Vec<Result<Prepared, MendError>> =
             selection.chosen.par_iter().map(prepare).collect();
@@ -76,7 +78,7 @@ impl Opened {
     ///
     /// # Errors
     /// As [`Opened::new`]; and when the scan has several holes and the search does not say which.
-    pub fn for_search(scan: &Scan, search: &Search, mender: &Mender) -> Result<Opened, MendError> {
+    pub fn for_search(scan: &Scan, search: &Search, call: Call) -> Result<Opened, MendError> {
         let asked = Constraints {
             holes: search
                 .hole
@@ -96,7 +98,7 @@ impl Opened {
         let selection = select(scan, &cloth, &asked).map_err(about_hole)?;
         let ids = selection.chosen.iter().map(|c| c.id);
         the_one(search.hole, ids)?;
-        Self::of(cloth, scan, &asked, mender)
+        Self::of(cloth, scan, &asked, call)
     }
 
     /// What imagines the cloth where a later request does not say.
@@ -115,13 +117,14 @@ impl Opened {
         &'a self,
         scan: &Scan,
         constraints: &Constraints,
-        mender: &'a Mender,
+        call: Call<'a>,
     ) -> Result<Patched<'a>, MendError> {
         let constraints = self.completed(constraints);
         let Selection { chosen, skipped } = select(scan, &self.cloth, &constraints)?;
-        let inpainter = chosen_inpainter(&constraints, mender)?;
+        let inpainter = chosen_inpainter(&constraints, call.mender)?;
         let started = Instant::now();
         let filled = chosen.par_iter().map(|chosen| {
+            go_on(call.wanted)?;
             let prepared = self.hole(chosen.id).ok_or_else(|| {
                 let opened: Vec<String> = self.holes.iter().map(|h| h.id.to_string()).collect();
                 let detail = format!(
@@ -131,7 +134,7 @@ impl Opened {
                 );
                 MendError::Constraints(vec![FieldError::new("/holes", detail)])
             })?;
-            hole::fill(prepared, chosen, &inpainter, &mender.limits)
+            hole::fill(prepared, chosen, &inpainter, &call.mender.limits)
         });
         let filled: Vec<Result<_, MendError>> = filled.collect();
         let mut filled: Vec<Filled> = filled.into_iter().collect::<Result<_, _>>()?;
@@ -156,9 +159,9 @@ impl Opened {
         &self,
         scan: &Scan,
         constraints: &Constraints,
-        mender: &Mender,
+        call: Call,
     ) -> Result<Mended, MendError> {
-        let patched = self.patched(scan, constraints, mender)?;
+        let patched = self.patched(scan, constraints, call)?;
         let started = Instant::now();
         let additions = self.additions(scan, &patched)?;
         let dressed_ms = milliseconds(started);
@@ -216,7 +219,7 @@ impl Opened {
     ///
     /// # Errors
     /// At `/hole` and `/start` when they do not fit, and whatever the network fails with.
-    pub fn search(&self, search: &Search, mender: &Mender) -> Result<v1::AnchorFound, MendError> {
+    pub fn search(&self, search: &Search, call: Call) -> Result<v1::AnchorFound, MendError> {
         let id = the_one(search.hole, self.holes.iter().map(|h| h.id))?;
         let Some(prepared) = self.hole(id) else {
             let detail = format!("hole {id} was not chosen when the scan was opened");
@@ -224,9 +227,9 @@ impl Opened {
                 "/hole", detail,
             )]));
         };
-        let inpainter = self.inpainter(mender)?;
-        let unedited = prepared.unedited(&inpainter, &mender.limits)?;
-        search::find(prepared, &unedited, &inpainter, (search, &mender.limits))
+        let inpainter = self.inpainter(call.mender)?;
+        let unedited = prepared.unedited(&inpainter, &call.mender.limits)?;
+        search::find(prepared, &unedited, &inpainter, (search, call))
     }
 
     fn hole(&self, id: u32) -> Option<&Prepared> {

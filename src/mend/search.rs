@@ -4,12 +4,11 @@ use std::time::Instant;
 
 use super::inpainter::Inpainter;
 use super::prepared::{Prepared, Unedited};
-use super::{Limits, MendError, milliseconds};
+use super::{Call, Limits, MendError, Wanted, go_on, milliseconds};
 use crate::contract::{FieldError, Search, v1};
 use crate::edit::{Found, Landscape, Slope, Step, descend, exhaust, map, nearest_cell, seeds};
 use crate::grid::{CELLS, NormalGrid, SIDE, cell_centre};
 use crate::mesh::{Vec2, Vec3};
-use crate::net::NetError;
 
 /// Targets farther away than this many extents of the hole are looked for that far along the same line: the network's numbers are f32.
 const FAR: f64 = 100.0;
@@ -21,6 +20,7 @@ struct Losses<'a> {
     target: [f32; 3],
     /// How far the target was drawn in, scene units.
     drawn_in: f64,
+    wanted: Wanted<'a>,
 }
 
 impl<'a> Losses<'a> {
@@ -32,21 +32,24 @@ impl<'a> Losses<'a> {
             grid: inpainter.turned(&prepared.normal_grid()),
             target: inpainter.entering(prepared.normal.to_network(&near)),
             inpainter,
+            wanted: &|| true,
         }
     }
 }
 
 impl Landscape for Losses<'_> {
-    type Error = NetError;
+    type Error = MendError;
 
-    fn losses(&self, cells: &[usize]) -> Result<Vec<f64>, NetError> {
+    fn losses(&self, cells: &[usize]) -> Result<Vec<f64>, MendError> {
+        go_on(self.wanted)?;
         let losses = self
             .inpainter
             .losses(&self.grid, self.target, &uvs(cells))?;
         Ok(losses.into_iter().map(f64::from).collect())
     }
 
-    fn slopes(&self, cells: &[usize]) -> Result<Vec<Slope>, NetError> {
+    fn slopes(&self, cells: &[usize]) -> Result<Vec<Slope>, MendError> {
+        go_on(self.wanted)?;
         let slopes = self
             .inpainter
             .slopes(&self.grid, self.target, &uvs(cells))?;
@@ -82,11 +85,15 @@ pub fn find(
     prepared: &Prepared,
     unedited: &Unedited,
     inpainter: &Inpainter,
-    (search, limits): (&Search, &Limits),
+    (search, call): (&Search, Call),
 ) -> Result<v1::AnchorFound, MendError> {
     let started = Instant::now();
+    let limits = &call.mender.limits;
     let target = Vec3::from(search.target);
-    let losses = Losses::new(prepared, inpainter, target);
+    let losses = Losses {
+        wanted: call.wanted,
+        ..Losses::new(prepared, inpainter, target)
+    };
     let first = match search.start {
         None => nearest(prepared, unedited, target),
         Some(uv) if prepared.holds(uv.into()) => nearest_cell(&prepared.cells, uv.into()),

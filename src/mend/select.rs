@@ -103,19 +103,25 @@ fn find(scan: &Scan, cloth: &Cloth, selector: &HoleSelector) -> Result<u32, Stri
                     cloth.loops.len()
                 )
             })?;
-            match reason_to_skip(scan, cloth, rim) {
-                Some(("non_manifold", _)) | None => Ok(*id),
-                Some((_, reason)) => Err(format!("loop {id} is never filled: it is {reason}")),
-            }
+            fillable(scan, cloth, rim)
         }
         HoleSelector::Near(point) => {
             let point = Vec3::from(*point);
             let holes = cloth.loops.iter().filter(|l| l.kind == LoopKind::Hole);
-            let near = holes.map(|l| (distance_to_loop(&cloth.welded.mesh, l, &point), l.id));
-            near.min_by(|a, b| a.0.total_cmp(&b.0))
-                .map(|(_, id)| id)
-                .ok_or_else(|| "the scan has no hole".to_owned())
+            let near = holes.map(|l| (distance_to_loop(&cloth.welded.mesh, l, &point), l));
+            let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0));
+            let (_, rim) = nearest.ok_or_else(|| "the scan has no hole".to_owned())?;
+            fillable(scan, cloth, rim)
         }
+    }
+}
+
+/// The id of a loop that may be filled when it is asked for.
+fn fillable(scan: &Scan, cloth: &Cloth, rim: &BoundaryLoop) -> Result<u32, String> {
+    match reason_to_skip(scan, cloth, rim) {
+        // An error of its own says so, with its own code.
+        Some(("non_manifold", _)) | None => Ok(rim.id),
+        Some((_, reason)) => Err(format!("loop {} is never filled: it is {reason}", rim.id)),
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::opened::{Opened, Patched};
 use super::prepared::Prepared;
-use super::{MendError, Mended, Mender, picture};
+use super::{Call, MendError, Mended, Mender, Wanted, picture};
 use crate::contract::{Constraints, FieldError, Search, v1};
 use crate::mesh::{Vec2, Vec3};
 use crate::scan::export::{Fresh, meshes};
@@ -28,6 +28,19 @@ impl Session {
         asked: &Constraints,
         mender: Arc<Mender>,
     ) -> Result<Session, MendError> {
+        Self::open_while(&|| true, scan, asked, mender)
+    }
+
+    /// The same for a caller who may go away.
+    ///
+    /// # Errors
+    /// The same, and `Abandoned`.
+    pub fn open_while(
+        wanted: Wanted,
+        scan: Scan,
+        asked: &Constraints,
+        mender: Arc<Mender>,
+    ) -> Result<Session, MendError> {
         let entries = [
             ("/anchors", asked.anchors.len()),
             ("/edits", asked.edits.len()),
@@ -42,8 +55,12 @@ impl Session {
         if !early.is_empty() {
             return Err(MendError::Constraints(early));
         }
-        let opened = Opened::new(&scan, asked, &mender)?;
-        let described = described(&opened, &scan, &mender)?;
+        let call = Call {
+            mender: &mender,
+            wanted,
+        };
+        let opened = Opened::new(&scan, asked, call)?;
+        let described = described(&opened, &scan, call)?;
         Ok(Session {
             scan,
             opened,
@@ -69,53 +86,49 @@ impl Session {
         counted + counted / 2
     }
 
-    /// The whole scan mended: the bytes that [`mend`](super::mend) gives for the same constraints.
-    ///
-    /// What the opening chose (holes, weights, up) may be left out of `constraints`.
+    /// For a caller who may go away.
+    pub fn turn<'a>(&'a self, wanted: Wanted<'a>) -> Turn<'a> {
+        let mender = &self.mender;
+        let call = Call { mender, wanted };
+        Turn {
+            session: self,
+            call,
+        }
+    }
+
+    /// [`Turn::mended`] for a caller who stays.
     ///
     /// # Errors
-    /// As [`mend`](super::mend).
+    /// The same.
     pub fn mended(&self, constraints: &Constraints) -> Result<Mended, MendError> {
-        let mut mended = self.opened.mended(&self.scan, constraints, &self.mender)?;
-        self.forget_preparation(&mut mended.report);
-        Ok(mended)
+        self.turn(&|| true).mended(constraints)
     }
 
-    /// The patches alone, as a GLB with one mesh for each hole, in order of id.
+    /// [`Turn::glb`] for a caller who stays.
     ///
     /// # Errors
-    /// As [`mend`](super::mend).
+    /// The same.
     pub fn glb(&self, constraints: &Constraints) -> Result<(Vec<u8>, v1::Report), MendError> {
-        let patched = self.patched(constraints)?;
-        let additions = self.opened.additions(&self.scan, &patched)?;
-        let bytes = glb(&self.scan, &additions)?;
-        Ok((bytes, self.reported(patched)))
+        self.turn(&|| true).glb(constraints)
     }
 
-    /// The positions of the patches' vertices, hole after hole in order of id, each in the order of its `patch_uvs`.
+    /// [`Turn::positions`] for a caller who stays.
     ///
     /// # Errors
-    /// As [`mend`](super::mend).
+    /// The same.
     pub fn positions(
         &self,
         constraints: &Constraints,
     ) -> Result<(Vec<Vec<Vec3>>, v1::Report), MendError> {
-        let patched = self.patched(constraints)?;
-        let each = patched.holes.iter();
-        let positions = each.map(|(_, made)| made.patch.positions.clone());
-        Ok((positions.collect(), self.reported(patched)))
+        self.turn(&|| true).positions(constraints)
     }
 
-    /// Searches where on a hole's grid a point in space belongs, with the weights of the opening.
+    /// [`Turn::optimize_anchor`] for a caller who stays.
     ///
     /// # Errors
-    /// At `/hole` and `/start` when they do not fit, and whatever the network fails with.
+    /// The same.
     pub fn optimize_anchor(&self, search: &Search) -> Result<v1::AnchorFound, MendError> {
-        self.opened.search(search, &self.mender)
-    }
-
-    fn patched(&self, constraints: &Constraints) -> Result<Patched<'_>, MendError> {
-        self.opened.patched(&self.scan, constraints, &self.mender)
+        self.turn(&|| true).optimize_anchor(search)
     }
 
     fn reported(&self, patched: Patched) -> v1::Report {
@@ -137,12 +150,76 @@ impl Session {
     }
 }
 
+/// A session, asked by somebody who may go away before the answer is there.
+#[derive(Clone, Copy)]
+pub struct Turn<'a> {
+    session: &'a Session,
+    call: Call<'a>,
+}
+
+impl<'a> Turn<'a> {
+    /// The whole scan mended: the bytes that [`mend`](super::mend) gives for the same constraints.
+    ///
+    /// What the opening chose (holes, weights, up) may be left out of `constraints`.
+    ///
+    /// # Errors
+    /// As [`mend`](super::mend), `Abandoned` among them.
+    pub fn mended(&self, constraints: &Constraints) -> Result<Mended, MendError> {
+        let mut mended = self
+            .session
+            .opened
+            .mended(&self.session.scan, constraints, self.call)?;
+        self.session.forget_preparation(&mut mended.report);
+        Ok(mended)
+    }
+
+    /// The patches alone, as a GLB with one mesh for each hole, in order of id.
+    ///
+    /// # Errors
+    /// As [`mend`](super::mend), `Abandoned` among them.
+    pub fn glb(&self, constraints: &Constraints) -> Result<(Vec<u8>, v1::Report), MendError> {
+        let patched = self.patched(constraints)?;
+        let additions = self
+            .session
+            .opened
+            .additions(&self.session.scan, &patched)?;
+        let bytes = glb(&self.session.scan, &additions)?;
+        Ok((bytes, self.session.reported(patched)))
+    }
+
+    /// The positions of the patches' vertices, hole after hole in order of id, each in the order of its `patch_uvs`.
+    ///
+    /// # Errors
+    /// As [`mend`](super::mend), `Abandoned` among them.
+    pub fn positions(
+        &self,
+        constraints: &Constraints,
+    ) -> Result<(Vec<Vec<Vec3>>, v1::Report), MendError> {
+        let patched = self.patched(constraints)?;
+        let each = patched.holes.iter();
+        let positions = each.map(|(_, made)| made.patch.positions.clone());
+        Ok((positions.collect(), self.session.reported(patched)))
+    }
+
+    /// Searches where on a hole's grid a point in space belongs, with the weights of the opening.
+    ///
+    /// # Errors
+    /// At `/hole` and `/start` when they do not fit, and whatever the network fails with.
+    pub fn optimize_anchor(&self, search: &Search) -> Result<v1::AnchorFound, MendError> {
+        self.session.opened.search(search, self.call)
+    }
+
+    fn patched(&self, constraints: &Constraints) -> Result<Patched<'a>, MendError> {
+        (self.session.opened).patched(&self.session.scan, constraints, self.call)
+    }
+}
+
 /// What stays the same, and the cloth as it is without constraints.
-fn described(opened: &Opened, scan: &Scan, mender: &Mender) -> Result<v1::Session, MendError> {
-    let patched = opened.patched(scan, &Constraints::default(), mender)?;
+fn described(opened: &Opened, scan: &Scan, call: Call) -> Result<v1::Session, MendError> {
+    let patched = opened.patched(scan, &Constraints::default(), call)?;
     let mut holes = Vec::new();
     for (prepared, made) in &patched.holes {
-        let unedited = prepared.unedited(&patched.inpainter, &mender.limits)?;
+        let unedited = prepared.unedited(&patched.inpainter, &call.mender.limits)?;
         let patch = &made.patch;
         let rim = patch.rim.len();
         let uv = |p: &Vec2| <[f64; 2]>::from(prepared.chart.frame.uv(*p));

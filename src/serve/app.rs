@@ -20,7 +20,7 @@ use super::{
     config::ServeArgs,
     pool::{Pool, PoolError},
     problem::Fault,
-    seam::{Class, Menders, Refusal},
+    seam::{Class, Menders, Refusal, Wanted},
     session::Session,
     sessions::{SessionLimits, Sessions},
     telemetry::Metrics,
@@ -125,7 +125,7 @@ impl App {
     /// The mend's, or that of the pool.
     pub async fn warm_up(&self) -> Result<(), Fault> {
         let deadline = Deadline::after(Duration::from_secs(3600));
-        self.work(None, deadline, |menders| menders.warm_up())
+        self.work(None, deadline, |menders, _| menders.warm_up())
             .await?;
         self.warm.store(true, Relaxed);
         Ok(())
@@ -154,7 +154,7 @@ impl App {
     pub async fn submit<T: Send + 'static>(
         &self,
         upload: Upload,
-        job: impl FnOnce(&dyn Menders) -> Result<T, Refusal> + Send + 'static,
+        job: impl FnOnce(&dyn Menders, Wanted<'_>) -> Result<T, Refusal> + Send + 'static,
     ) -> Result<T, Fault> {
         let deadline = Deadline::after(self.limits.deadline);
         self.work(Some(upload), deadline, job).await
@@ -170,26 +170,29 @@ impl App {
         &self,
         id: Uuid,
         upload: Upload,
-        job: impl FnOnce(&Session) -> Result<T, Refusal> + Send + 'static,
+        job: impl FnOnce(&Session, Wanted<'_>) -> Result<T, Refusal> + Send + 'static,
     ) -> Result<T, Fault> {
         let deadline = Deadline::after(self.limits.deadline);
         let lease = self.sessions.lease(id, std::time::Instant::now())?;
         let turn = timeout_at(deadline.at, lease.turn()).await;
         let turn = turn.map_err(|_| fault(PoolError::Expired, deadline.length))?;
-        self.work(Some(upload), deadline, move |_| turn.work(job))
-            .await
+        self.work(Some(upload), deadline, move |_, wanted| {
+            turn.work(|session| job(session, wanted))
+        })
+        .await
     }
 
     async fn work<T: Send + 'static>(
         &self,
         upload: Option<Upload>,
         deadline: Deadline,
-        job: impl FnOnce(&dyn Menders) -> Result<T, Refusal> + Send + 'static,
+        job: impl FnOnce(&dyn Menders, Wanted<'_>) -> Result<T, Refusal> + Send + 'static,
     ) -> Result<T, Fault> {
         let menders = Arc::clone(&self.menders);
         let outcome = match self.pool.admit() {
             Ok(admission) => {
-                let answer = (self.pool).run(admission, deadline.at, move || job(&*menders));
+                let answer =
+                    (self.pool).run(admission, deadline.at, move |wanted| job(&*menders, wanted));
                 // Not before the job is in the queue, which a drain closes when no upload is left.
                 drop(upload);
                 answer.await

@@ -51,7 +51,8 @@ pub struct ServeArgs {
     #[arg(long, env = "DARN_BODY_LIMIT", value_name = "SIZE", default_value = "128MiB", value_parser = size)]
     pub body_limit: usize,
 
-    /// Longest pause between two pieces of a request body; the whole may take eight times as long
+    /// Longest pause between two pieces of a request; the whole body may take eight times as long. Who takes nothing of an answer, or
+    /// sends no request, for so long is let go
     #[arg(long, env = "DARN_BODY_TIMEOUT", value_name = "TIME", default_value = "15s", value_parser = duration)]
     pub body_timeout: Duration,
 
@@ -62,6 +63,10 @@ pub struct ServeArgs {
     /// Most triangles a scan may have
     #[arg(long, env = "DARN_MAX_FACES", value_name = "N", default_value = "4000000", value_parser = count)]
     pub max_faces: usize,
+
+    /// Most vertices a scan may have, as its files count them: one that a texture seam splits counts twice
+    #[arg(long, env = "DARN_MAX_VERTICES", value_name = "N", default_value = "2000000", value_parser = count)]
+    pub max_vertices: usize,
 
     /// Time without a request after which a session ends, such as 15m
     #[arg(long, env = "DARN_SESSION_IDLE", value_name = "TIME", default_value = "15m", value_parser = duration)]

@@ -59,8 +59,8 @@ async fn open(State(app): State<Arc<App>>, request: Request) -> Result<Response,
     let asked = question::choosing(question.unwrap_or_default())?;
     let (id, sessions) = (Uuid::new_v4(), Arc::clone(&app.sessions));
     let idle_seconds = sessions.limits().idle.as_secs_f64();
-    let job = app.submit(upload, move |menders| {
-        let kept = menders.open(&scan, &asked)?;
+    let job = app.submit(upload, move |menders, wanted| {
+        let kept = menders.open(&scan, &asked, wanted)?;
         let text = session_json(kept.described(), id, idle_seconds);
         Ok((kept, text))
     });
@@ -81,7 +81,7 @@ async fn describe(
     let upload = enter(&app, id)?;
     let idle_seconds = app.sessions.limits().idle.as_secs_f64();
     let text = app
-        .submit_to(id, upload, move |session| {
+        .submit_to(id, upload, move |session, _| {
             Ok(session_json(session.described(), id, idle_seconds))
         })
         .await?;
@@ -101,7 +101,9 @@ async fn inpaint(
     let (asked, upload) = asked_of::<Constraints>(&app, id, request).await?;
     let asked = question::moving(asked.unwrap_or_default())?;
     let patches = app
-        .submit_to(id, upload, move |session| session.patches(&asked, form))
+        .submit_to(id, upload, move |session, wanted| {
+            session.patches(&asked, form, wanted)
+        })
         .await?;
     app.metrics.mended(&patches.report);
     Ok(Cloth::of_patches(patches, form).response(wanted))
@@ -116,9 +118,9 @@ async fn optimize_anchor(
     let place = "the body, application/json";
     let search = search.ok_or(Fault::NoQuery { place })?;
     let text = app
-        .submit_to(id, upload, move |session| {
+        .submit_to(id, upload, move |session, wanted| {
             session
-                .optimize_anchor(&search)
+                .optimize_anchor(&search, wanted)
                 .map(|found| answer::json(&found))
         })
         .await?;
@@ -133,7 +135,7 @@ async fn result(
     let wanted = answer::preferred(request.headers(), &[GLB, GLTF, PARTS]);
     let upload = enter(&app, id)?;
     let mended = app
-        .submit_to(id, upload, |session| session.result())
+        .submit_to(id, upload, |session, wanted| session.result(wanted))
         .await?;
     app.metrics.mended(&mended.report);
     Ok(Cloth::from(mended).response(wanted))

@@ -28,13 +28,14 @@ use crate::contract::{
 
 /// Bytes of a scan per message of an answer.
 const CHUNK: usize = 256 << 10;
-/// What a message may hold beside the scan's bytes.
-const MARGIN: usize = 1 << 20;
+/// Bytes of a message that comes in. Read as messages, empty ones at worst, they take up to 36 times as much memory: as much as a body of
+/// the usual limit.
+const MESSAGE: usize = 4 << 20;
 
 /// The service, ready to be routed.
 pub fn service(app: &Arc<App>) -> DarnServer<Door> {
     DarnServer::new(Door(Arc::clone(app)))
-        .max_decoding_message_size(app.limits.body.saturating_add(MARGIN))
+        .max_decoding_message_size(MESSAGE)
         .max_encoding_message_size(usize::MAX)
 }
 
@@ -85,7 +86,7 @@ impl Door {
     async fn holes(&self, stream: Streaming<ScanChunk>) -> Result<HolesReport, Fault> {
         let Asked { scan, upload, .. } = self.read(stream).await?.unconstrained()?;
         self.0
-            .submit(upload, move |menders| menders.find_holes(&scan))
+            .submit(upload, move |menders, _| menders.find_holes(&scan))
             .await
     }
 
@@ -98,7 +99,9 @@ impl Door {
         let asked = question.unwrap_or_default();
         let mended = self
             .0
-            .submit(upload, move |menders| menders.inpaint(&scan, &asked))
+            .submit(upload, move |menders, wanted| {
+                menders.inpaint(&scan, &asked, wanted)
+            })
             .await?;
         self.0.metrics.mended(&mended.report);
         Ok(mended)
@@ -113,8 +116,8 @@ impl Door {
         let place = "the field `query` of the first chunk";
         let search = question.ok_or(Fault::NoQuery { place })?;
         self.0
-            .submit(upload, move |menders| {
-                menders.optimize_anchor(&scan, &search)
+            .submit(upload, move |menders, wanted| {
+                menders.optimize_anchor(&scan, &search, wanted)
             })
             .await
     }
@@ -129,7 +132,7 @@ impl Door {
         while let Some(mut chunk) = patience
             .next(stream.message())
             .await?
-            .map_err(|status| broken(&status, limit))?
+            .map_err(|status| broken(&status))?
         {
             if let Some(message) = Q::take(&mut chunk) {
                 if !first {
@@ -180,10 +183,10 @@ impl Carried for Search {
     }
 }
 
-fn broken(status: &Status, limit: usize) -> Fault {
+fn broken(status: &Status) -> Fault {
     match status.code() {
         // What tonic says of a message above its limit.
-        Code::OutOfRange => Fault::TooLarge { limit },
+        Code::OutOfRange => Fault::MessageTooLarge { limit: MESSAGE },
         _ => Fault::Malformed(format!("the stream broke off: {}", status.message())),
     }
 }

@@ -10,6 +10,7 @@ use tracing::{Span, warn};
 
 use super::{
     pool::{Admission, PoolError},
+    seam::Wanted,
     telemetry::PoolMetrics,
 };
 
@@ -39,7 +40,7 @@ pub struct Job<T, W> {
     pub admission: Admission,
 }
 
-impl<T: Send, W: FnOnce() -> T + Send> Entry for Job<T, W> {
+impl<T: Send, W: FnOnce(Wanted<'_>) -> T + Send> Entry for Job<T, W> {
     fn is_wanted(&self) -> bool {
         !self.reply.is_closed() && Instant::now() < self.deadline
     }
@@ -52,15 +53,21 @@ impl<T: Send, W: FnOnce() -> T + Send> Entry for Job<T, W> {
         let Self {
             work,
             reply,
+            deadline,
             span,
             admission,
             ..
         } = *self;
         let _entered = span.enter();
-        let outcome = catch_unwind(AssertUnwindSafe(work)).map_err(|_| {
+        let wanted = || !reply.is_closed() && Instant::now() < deadline;
+        let mut outcome = catch_unwind(AssertUnwindSafe(|| work(&wanted))).map_err(|_| {
             metrics.panicked.increment(1);
             PoolError::Panicked
         });
+        if Instant::now() >= deadline {
+            // The work may have been given up for it: then what it says is not what its caller should hear.
+            outcome = Err(PoolError::Expired);
+        }
         drop(admission);
         if reply.send(outcome).is_err() {
             metrics.discarded.increment(1);

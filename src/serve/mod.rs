@@ -5,6 +5,7 @@
 mod answer;
 mod app;
 mod config;
+mod door;
 mod editing;
 mod graves;
 mod grpc;
@@ -24,14 +25,13 @@ mod shutdown;
 mod telemetry;
 
 use std::{
-    future::IntoFuture as _,
     io,
     net::SocketAddr,
     sync::Arc,
     time::{Duration, Instant},
 };
 
-use axum::{Router, serve::ListenerExt as _};
+use axum::Router;
 use tokio::{net::TcpListener, runtime, task, time};
 use tokio_util::sync::CancellationToken;
 use tracing::{error, info};
@@ -40,7 +40,7 @@ pub use self::{
     app::App,
     config::{Autodiff, Backend, NetworkArgs, ServeArgs},
     healthcheck::{HealthError, healthcheck},
-    seam::{Class, Kept, Mended, Menders, PatchForm, Patches, Refusal},
+    seam::{Class, Kept, Mended, Menders, PatchForm, Patches, Refusal, Wanted},
     telemetry::{LogFormat, start_logging},
 };
 
@@ -129,12 +129,18 @@ pub async fn serve(
 ) -> Result<(), ServeError> {
     info!(address = %sockets.http.local_addr()?, "listening");
     let mut doors = tokio::task::JoinSet::new();
+    let pause = app.limits.body_pause;
     if let Some(socket) = sockets.grpc {
         info!(address = %socket.local_addr()?, "listening for grpc alone");
-        doors.spawn(open(socket, grpc_router(&app), stop.clone()));
-        doors.spawn(open(sockets.http, http_router(&app), stop.clone()));
+        doors.spawn(door::open(socket, grpc_router(&app), stop.clone(), pause));
+        doors.spawn(door::open(
+            sockets.http,
+            http_router(&app),
+            stop.clone(),
+            pause,
+        ));
     } else {
-        doors.spawn(open(sockets.http, router(&app), stop.clone()));
+        doors.spawn(door::open(sockets.http, router(&app), stop.clone(), pause));
     }
     let upkeep = tokio::spawn(upkeep(Arc::clone(&app)));
     let drained = tokio::spawn({
@@ -164,7 +170,7 @@ pub async fn serve(
 
     let serving = async {
         while let Some(door) = doors.join_next().await {
-            door.map_err(io::Error::other)??;
+            door.map_err(io::Error::other)?;
         }
         Ok::<(), io::Error>(())
     };
@@ -203,17 +209,6 @@ fn grpc_routes(app: &Arc<App>) -> Router<Arc<App>> {
     let service = grpc::service(app)
         .map_request(|request: axum::extract::Request| request.map(tonic::body::Body::new));
     Router::new().route_service("/darn.v1.Darn/{method}", service)
-}
-
-async fn open(socket: TcpListener, router: Router, stop: CancellationToken) -> io::Result<()> {
-    let socket = socket.tap_io(|stream| {
-        // Only costs latency when it fails.
-        stream.set_nodelay(true).ok();
-    });
-    axum::serve(socket, router)
-        .with_graceful_shutdown(stop.cancelled_owned())
-        .into_future()
-        .await
 }
 
 async fn upkeep(app: Arc<App>) {

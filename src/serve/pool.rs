@@ -1,7 +1,7 @@
 //! A bounded queue in front of a few blocking worker threads. Knows jobs as closures; knows no HTTP and no scans.
 //!
 //! First come, first served, so whoever has a place gets a worker once those before it are done: nobody is overtaken. A job
-//! whose caller went away or whose deadline passed is skipped.
+//! whose caller went away or whose deadline passed is skipped, or told so while it runs.
 
 use std::{
     collections::VecDeque,
@@ -22,6 +22,7 @@ use tracing::Span;
 
 use super::{
     job::{Entry, Job},
+    seam::Wanted,
     telemetry::PoolMetrics,
 };
 
@@ -149,7 +150,7 @@ impl Pool {
     }
 
     /// Puts a job into the queue at once; the future waits for its result, until the deadline. Dropping it skips the job if it
-    /// has not begun.
+    /// has not begun, and tells it that nobody waits if it has.
     ///
     /// # Errors
     /// `Closed`, `Expired` or `Panicked`.
@@ -157,7 +158,7 @@ impl Pool {
         &self,
         admission: Admission,
         deadline: Instant,
-        work: impl FnOnce() -> T + Send + 'static,
+        work: impl FnOnce(Wanted<'_>) -> T + Send + 'static,
     ) -> impl Future<Output = Result<T, PoolError>> {
         let (reply, answer) = oneshot::channel();
         let pushed = self.0.push(Box::new(Job {

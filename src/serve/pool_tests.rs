@@ -14,13 +14,13 @@ fn soon() -> Instant {
 
 /// A job that runs until told, and tells when it has begun.
 fn held() -> (
-    impl FnOnce() + Send + 'static,
+    impl FnOnce(Wanted<'_>) + Send + 'static,
     mpsc::Receiver<()>,
     mpsc::Sender<()>,
 ) {
     let (begun, has_begun) = mpsc::channel();
     let (release, released) = mpsc::channel::<()>();
-    let work = move || {
+    let work = move |_: Wanted<'_>| {
         begun.send(()).ok();
         released.recv().ok();
     };
@@ -42,7 +42,7 @@ async fn a_full_pool_says_so_and_frees_places_of_those_who_left() {
         .unwrap();
 
     let second = pool.admit().unwrap();
-    let mut waiting = Box::pin(pool.run(second, soon(), || panic!("must be skipped")));
+    let mut waiting = Box::pin(pool.run(second, soon(), |_| panic!("must be skipped")));
     assert!(futures_poll(&mut waiting).await.is_none());
     assert_eq!(
         pool.admit().unwrap_err(),
@@ -57,7 +57,7 @@ async fn a_full_pool_says_so_and_frees_places_of_those_who_left() {
     let third = pool.admit().unwrap();
     release.send(()).unwrap();
     assert_eq!(running.await.unwrap(), Ok(()));
-    assert_eq!(pool.run(third, soon(), || 7).await, Ok(7));
+    assert_eq!(pool.run(third, soon(), |_| 7).await, Ok(7));
 }
 
 #[tokio::test]
@@ -74,7 +74,7 @@ async fn who_came_first_is_served_first() {
     let waiting: Vec<_> = (0..8)
         .map(|i| {
             let order = Arc::clone(&order);
-            let work = move || order.lock().unwrap().push(i);
+            let work = move |_: Wanted<'_>| order.lock().unwrap().push(i);
             pool.run(pool.admit().unwrap(), soon(), work)
         })
         .collect();
@@ -108,7 +108,7 @@ async fn a_deadline_covers_waiting_and_running() {
         .run(
             pool.admit().unwrap(),
             Instant::now() + Duration::from_millis(10),
-            move || {
+            move |_| {
                 tell.send(()).ok();
             },
         )
@@ -116,21 +116,50 @@ async fn a_deadline_covers_waiting_and_running() {
     assert_eq!(waiting, Err(PoolError::Expired));
     assert_eq!(running.await.unwrap(), Err(PoolError::Expired));
     release.send(()).unwrap();
-    assert_eq!(pool.run(pool.admit().unwrap(), soon(), || 1).await, Ok(1));
+    assert_eq!(pool.run(pool.admit().unwrap(), soon(), |_| 1).await, Ok(1));
     assert!(told.try_recv().is_err(), "an expired job must not run");
+}
+
+#[tokio::test]
+async fn a_running_job_learns_that_nobody_waits() {
+    let pool = pool(1, 4);
+    let (told, hears) = mpsc::channel();
+    let working = |told: mpsc::Sender<bool>| {
+        move |wanted: Wanted<'_>| {
+            told.send(wanted()).ok();
+            while wanted() {
+                std::thread::yield_now();
+            }
+            told.send(false).ok();
+        }
+    };
+    let mut leaving = Box::pin(pool.run(pool.admit().unwrap(), soon(), working(told.clone())));
+    assert!(futures_poll(&mut leaving).await.is_none());
+    let hears = tokio::task::spawn_blocking(move || {
+        assert_eq!(hears.recv(), Ok(true));
+        hears
+    });
+    let hears = hears.await.unwrap();
+    drop(leaving);
+    // Its worker is free again, for one whose time is up before it would end by itself.
+    let deadline = Instant::now() + Duration::from_millis(100);
+    let late = pool.run(pool.admit().unwrap(), deadline, working(told));
+    assert_eq!(late.await, Err(PoolError::Expired));
+    assert_eq!(pool.run(pool.admit().unwrap(), soon(), |_| 4).await, Ok(4));
+    assert_eq!(hears.iter().collect::<Vec<_>>(), [false, true, false]);
 }
 
 #[tokio::test]
 async fn a_panic_is_its_own_jobs_error_and_a_closed_pool_finishes_what_it_took() {
     let pool = pool(1, 4);
     let panicked = pool
-        .run(pool.admit().unwrap(), soon(), || panic!("on purpose"))
+        .run(pool.admit().unwrap(), soon(), |_| panic!("on purpose"))
         .await;
     assert_eq!(panicked, Err::<(), _>(PoolError::Panicked));
-    assert_eq!(pool.run(pool.admit().unwrap(), soon(), || 2).await, Ok(2));
+    assert_eq!(pool.run(pool.admit().unwrap(), soon(), |_| 2).await, Ok(2));
 
     let last = pool.admit().unwrap();
-    let mut job = Box::pin(pool.run(last, soon(), || 3));
+    let mut job = Box::pin(pool.run(last, soon(), |_| 3));
     let early = futures_poll(&mut job).await;
     pool.close();
     assert_eq!(pool.admit().unwrap_err(), PoolError::Closed);

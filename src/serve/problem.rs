@@ -51,6 +51,14 @@ pub enum Fault {
         /// The limit, in bytes.
         limit: usize,
     },
+    /// A message of a stream is larger than the limit.
+    #[error(
+        "a message of the stream is larger than {limit} bytes, the limit; send the scan in several"
+    )]
+    MessageTooLarge {
+        /// The limit, in bytes.
+        limit: usize,
+    },
     /// What is asked is larger than its own limit.
     #[error("the {what} larger than {limit} bytes, the limit")]
     AskedTooLarge {
@@ -172,6 +180,11 @@ impl Fault {
             Self::TooLarge { .. } => Row(
                 S::PAYLOAD_TOO_LARGE,
                 "body_too_large",
+                Code::ResourceExhausted,
+            ),
+            Self::MessageTooLarge { .. } => Row(
+                S::PAYLOAD_TOO_LARGE,
+                "message_too_large",
                 Code::ResourceExhausted,
             ),
             Self::AskedTooLarge { what, .. } => Row(
@@ -310,11 +323,12 @@ impl Fault {
         response
     }
 
-    /// The gRPC status: the same code as `darn-code`, the same document as `darn-problem-bin`.
+    /// The gRPC status: the same code as `darn-code`, the same document as `darn-problem-bin`, cut to what fits into the headers that
+    /// clients take (8 KiB and up).
     pub fn grpc(&self, request_id: &str) -> tonic::Status {
         let Row(_, code, grpc) = self.row();
-        let mut status = tonic::Status::new(grpc, self.to_string());
-        let document = serde_json::to_vec(&self.document(request_id)).unwrap_or_default();
+        let mut status = tonic::Status::new(grpc, cut(self.to_string(), GRPC_MESSAGE));
+        let document = self.document(request_id).within(GRPC_DOCUMENT);
         let metadata = status.metadata_mut();
         metadata.insert("darn-code", MetadataValue::from_static(code));
         metadata.insert_bin("darn-problem-bin", MetadataValue::from_bytes(&document));
@@ -323,6 +337,21 @@ impl Fault {
         }
         status
     }
+}
+
+/// Bytes of a gRPC status' message; percent-encoding may triple them.
+const GRPC_MESSAGE: usize = 600;
+/// Bytes of the document beside it; base64 adds a third.
+const GRPC_DOCUMENT: usize = 3 << 10;
+
+/// A text cut to so many bytes at most, the last of them an ellipsis.
+fn cut(mut text: String, most: usize) -> String {
+    const MORE: &str = "…";
+    if text.len() > most {
+        text.truncate(text.floor_char_boundary(most.saturating_sub(MORE.len())));
+        text.push_str(MORE);
+    }
+    text
 }
 
 fn of_session(error: &SessionError) -> Row {
@@ -382,6 +411,40 @@ pub struct Problem {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     errors: Vec<ProblemField>,
 }
+
+impl Problem {
+    /// The document as JSON of at most `most` bytes: with as many of its `errors` as fit, and a word on the others.
+    fn within(mut self, most: usize) -> Vec<u8> {
+        let whole = self.json();
+        if whole.len() <= most {
+            return whole;
+        }
+        self.detail = cut(self.detail, most / 4);
+        let errors = std::mem::take(&mut self.errors);
+        let all = errors.len();
+        for error in errors {
+            let detail = cut(error.detail, most / 4);
+            let pointer = cut(error.pointer, most / 4);
+            self.errors.push(ProblemField { pointer, detail });
+            if self.json().len() > most - REST {
+                self.errors.pop();
+                break;
+            }
+        }
+        let left = all - self.errors.len();
+        if left > 0 {
+            self.detail.push_str(&format!("; {left} more"));
+        }
+        self.json()
+    }
+
+    fn json(&self) -> Vec<u8> {
+        serde_json::to_vec(self).unwrap_or_default()
+    }
+}
+
+/// Bytes kept free for the word on what was left out.
+const REST: usize = 64;
 
 #[derive(Debug, Clone, Serialize)]
 struct ProblemField {

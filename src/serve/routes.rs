@@ -125,7 +125,9 @@ async fn inpaint(State(app): State<Arc<App>>, request: Request) -> Result<Respon
     } = admitted::<Constraints>(&app, request).await?;
     let asked = question.unwrap_or_default();
     let mended = app
-        .submit(upload, move |menders| menders.inpaint(&scan, &asked))
+        .submit(upload, move |menders, wanted| {
+            menders.inpaint(&scan, &asked, wanted)
+        })
         .await?;
     app.metrics.mended(&mended.report);
     Ok(Cloth::from(mended).response(wanted))
@@ -134,7 +136,7 @@ async fn inpaint(State(app): State<Arc<App>>, request: Request) -> Result<Respon
 async fn holes(State(app): State<Arc<App>>, request: Request) -> Result<Response, Fault> {
     let Asked { scan, upload, .. } = admitted(&app, request).await?.unconstrained()?;
     let report = app
-        .submit(upload, move |menders| menders.find_holes(&scan))
+        .submit(upload, move |menders, _| menders.find_holes(&scan))
         .await?;
     Ok(Json(report).into_response())
 }
@@ -150,16 +152,16 @@ async fn optimize_anchor(State(app): State<Arc<App>>, request: Request) -> Resul
     let search = question.ok_or(Fault::NoQuery { place })?;
     if wanted == JSON {
         let text = app
-            .submit(upload, move |menders| {
-                let found = menders.optimize_anchor(&scan, &search)?;
+            .submit(upload, move |menders, wanted| {
+                let found = menders.optimize_anchor(&scan, &search, wanted)?;
                 Ok(answer::json(&found))
             })
             .await?;
         return Ok(answer::json_response(text));
     }
     let mended = app
-        .submit(upload, move |menders| {
-            menders.mend_to_target(&scan, &search)
+        .submit(upload, move |menders, wanted| {
+            menders.mend_to_target(&scan, &search, wanted)
         })
         .await?;
     app.metrics.mended(&mended.report);

@@ -13,31 +13,55 @@ pub struct Mended {
     pub report: v1::Report,
 }
 
+/// Whether anybody still waits for an answer; cheap, and may be asked from any thread. Whoever mends asks now and then, and gives up
+/// with any refusal when nobody does.
+pub type Wanted<'a> = &'a (dyn Fn() -> bool + Sync);
+
 /// What mends. Called from many worker threads at once; every call blocks until it is done.
 pub trait Menders: Send + Sync + 'static {
     /// Fills the holes asked for.
     ///
     /// # Errors
     /// Why not.
-    fn inpaint(&self, scan: &[u8], constraints: &Constraints) -> Result<Mended, Refusal>;
+    fn inpaint(
+        &self,
+        scan: &[u8],
+        constraints: &Constraints,
+        wanted: Wanted<'_>,
+    ) -> Result<Mended, Refusal>;
 
     /// Searches where on a hole's grid a point in space belongs.
     ///
     /// # Errors
     /// Why not.
-    fn optimize_anchor(&self, scan: &[u8], search: &Search) -> Result<v1::AnchorFound, Refusal>;
+    fn optimize_anchor(
+        &self,
+        scan: &[u8],
+        search: &Search,
+        wanted: Wanted<'_>,
+    ) -> Result<v1::AnchorFound, Refusal>;
 
     /// The same, and the hole mended with the anchor it found.
     ///
     /// # Errors
     /// Why not.
-    fn mend_to_target(&self, scan: &[u8], search: &Search) -> Result<Mended, Refusal>;
+    fn mend_to_target(
+        &self,
+        scan: &[u8],
+        search: &Search,
+        wanted: Wanted<'_>,
+    ) -> Result<Mended, Refusal>;
 
     /// Keeps a scan, its holes laid flat, so that constraints alone can be sent from then on. The constraints choose holes and weights.
     ///
     /// # Errors
     /// Why not.
-    fn open(&self, scan: &[u8], constraints: &Constraints) -> Result<Box<dyn Kept>, Refusal>;
+    fn open(
+        &self,
+        scan: &[u8],
+        constraints: &Constraints,
+        wanted: Wanted<'_>,
+    ) -> Result<Box<dyn Kept>, Refusal>;
 
     /// Every boundary loop of a scan.
     ///
@@ -66,19 +90,28 @@ pub trait Kept: Send + Sync + 'static {
     ///
     /// # Errors
     /// Why not.
-    fn patches(&self, constraints: &Constraints, form: PatchForm) -> Result<Patches, Refusal>;
+    fn patches(
+        &self,
+        constraints: &Constraints,
+        form: PatchForm,
+        wanted: Wanted<'_>,
+    ) -> Result<Patches, Refusal>;
 
     /// The whole scan with the same constraints: the bytes that the stateless call would answer.
     ///
     /// # Errors
     /// Why not.
-    fn mended(&self, constraints: &Constraints) -> Result<Mended, Refusal>;
+    fn mended(&self, constraints: &Constraints, wanted: Wanted<'_>) -> Result<Mended, Refusal>;
 
     /// Searches where on a hole's grid a point in space belongs.
     ///
     /// # Errors
     /// Why not.
-    fn optimize_anchor(&self, search: &Search) -> Result<v1::AnchorFound, Refusal>;
+    fn optimize_anchor(
+        &self,
+        search: &Search,
+        wanted: Wanted<'_>,
+    ) -> Result<v1::AnchorFound, Refusal>;
 }
 
 /// How patches are sent.

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use super::seam::{Kept, Mended, PatchForm, Patches, Refusal};
+use super::seam::{Kept, Mended, PatchForm, Patches, Refusal, Wanted};
 use crate::contract::{Anchor, Constraints, Edit, Search, v1};
 
 /// Bytes a session takes beside what it keeps.
@@ -32,13 +32,20 @@ impl Session {
         self.kept.described()
     }
 
-    /// The patches alone; the constraints are remembered once they have been met.
+    /// The patches alone; the constraints are remembered once they have been met and somebody hears of it.
     ///
     /// # Errors
     /// Why they cannot be met.
-    pub fn patches(&self, asked: &Constraints, form: PatchForm) -> Result<Patches, Refusal> {
-        let patches = self.kept.patches(asked, form)?;
-        *self.last() = asked.clone();
+    pub fn patches(
+        &self,
+        asked: &Constraints,
+        form: PatchForm,
+        wanted: Wanted<'_>,
+    ) -> Result<Patches, Refusal> {
+        let patches = self.kept.patches(asked, form, wanted)?;
+        if wanted() {
+            *self.last() = asked.clone();
+        }
         Ok(patches)
     }
 
@@ -46,17 +53,21 @@ impl Session {
     ///
     /// # Errors
     /// Why not.
-    pub fn result(&self) -> Result<Mended, Refusal> {
+    pub fn result(&self, wanted: Wanted<'_>) -> Result<Mended, Refusal> {
         let last = self.last().clone();
-        self.kept.mended(&last)
+        self.kept.mended(&last, wanted)
     }
 
     /// Where on a hole's grid a point belongs.
     ///
     /// # Errors
     /// Why not.
-    pub fn optimize_anchor(&self, search: &Search) -> Result<v1::AnchorFound, Refusal> {
-        self.kept.optimize_anchor(search)
+    pub fn optimize_anchor(
+        &self,
+        search: &Search,
+        wanted: Wanted<'_>,
+    ) -> Result<v1::AnchorFound, Refusal> {
+        self.kept.optimize_anchor(search, wanted)
     }
 
     /// Waits for its turn: first come, first served; over when the permit is dropped. No thread waits with it.

@@ -8,7 +8,7 @@ use super::*;
 use crate::{
     contract::{Anchor, Constraints, Search, v1},
     serve::{
-        seam::{Mended, PatchForm, Patches, Refusal},
+        seam::{Mended, PatchForm, Patches, Refusal, Wanted},
         session::OVERHEAD,
     },
 };
@@ -36,19 +36,19 @@ impl Kept for Scan {
         self.bytes.load(Relaxed)
     }
 
-    fn patches(&self, _: &Constraints, _: PatchForm) -> Result<Patches, Refusal> {
+    fn patches(&self, _: &Constraints, _: PatchForm, _: Wanted<'_>) -> Result<Patches, Refusal> {
         let report = v1::Report::default();
         let bytes = Vec::new();
         Ok(Patches { bytes, report })
     }
 
-    fn mended(&self, asked: &Constraints) -> Result<Mended, Refusal> {
+    fn mended(&self, asked: &Constraints, _: Wanted<'_>) -> Result<Mended, Refusal> {
         let bytes = vec![0; asked.anchors.len()];
         let report = v1::Report::default();
         Ok(Mended { bytes, report })
     }
 
-    fn optimize_anchor(&self, _: &Search) -> Result<v1::AnchorFound, Refusal> {
+    fn optimize_anchor(&self, _: &Search, _: Wanted<'_>) -> Result<v1::AnchorFound, Refusal> {
         Ok(v1::AnchorFound::default())
     }
 }
@@ -236,13 +236,17 @@ fn the_result_is_that_of_the_constraints_last_met() {
         position: [0.0; 3],
         hard: false,
     };
-    assert_eq!(session.result().unwrap().bytes.len(), 0);
+    let size = || session.result(&|| true).unwrap().bytes.len();
+    assert_eq!(size(), 0);
     let asked = Constraints {
         anchors: vec![anchor; 3],
         ..Constraints::default()
     };
-    session.patches(&asked, PatchForm::Glb).unwrap();
-    assert_eq!(session.result().unwrap().bytes.len(), 3);
+    // Of what nobody waited for, nobody knows.
+    session.patches(&asked, PatchForm::Glb, &|| false).unwrap();
+    assert_eq!(size(), 0);
+    session.patches(&asked, PatchForm::Glb, &|| true).unwrap();
+    assert_eq!(size(), 3);
     assert!(session.bytes() > 3 * size_of::<Anchor>());
 }
 

@@ -1,12 +1,15 @@
 //! What a request may ask of a scan, and what it is told.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use darn::contract::{Anchor, Constraints, Edit, Gesture, HoleSelector};
-use darn::mend::MendError;
+use darn::mend::{Call, Limits, MendError, Mender, mend};
 use darn::mesh::intersect::intersections_with;
 use darn::mesh::{TriMesh, Vec3};
+use darn::net::{BackendKind, Network, Networks};
 use darn::scarffolds::scanned::Hole;
 
-use super::cloth::{ROUND, Seen, holed, laid, mended, packed, sheet};
+use super::cloth::{ROUND, Seen, WEIGHTS, holed, laid, mended, mender, packed, read, sheet};
 
 /// Two sheets side by side, each with a hole; the second is moved along x.
 fn pair() -> Vec<u8> {
@@ -124,10 +127,79 @@ fn a_mesh_that_two_nodes_draw_is_mended_once() {
     doubled.extend(rest);
     let mended = mended(&doubled, &Constraints::default()).unwrap();
     assert_eq!(mended.report.holes.len(), 1);
-    assert!(mended.report.skipped.iter().any(|s| s.code == "same_mesh"));
+    let again = mended.report.skipped.iter().find(|s| s.code == "same_mesh");
+    let again = again.expect("the other node's");
     let after = Seen::of(&mended.bytes);
     assert_eq!(after.loops.len(), 2, "both nodes show the one patch");
     assert!(after.topology.non_manifold.is_empty());
+
+    let loops = Seen::of(&doubled).loops;
+    let places = [mended.report.holes[0].id, again.id]
+        .map(|id| HoleSelector::Near(loops[id as usize].centroid.into()));
+    let error = super::cloth::mended(&doubled, &asking(&places)).unwrap_err();
+    let pointers: Vec<String> = error.fields().into_iter().map(|f| f.pointer).collect();
+    assert_eq!(pointers, ["/holes/1"]);
+}
+
+#[test]
+fn a_loose_piece_in_the_hole_is_told_of() {
+    let mut mesh = holed(sheet(0), &ROUND).mesh;
+    let alone = mended(&packed(&mesh, &[]), &Constraints::default()).unwrap();
+    let spoken = |notes: &[String]| notes.iter().any(|n| n.contains("loose piece"));
+    assert!(!spoken(&alone.report.holes[0].notes));
+
+    // A shred of the new cloth.
+    let new = Seen::of(&alone.bytes);
+    let at = |f: &usize| {
+        let corners = new.welded.mesh.faces[*f].map(|v| new.welded.mesh.positions[v as usize]);
+        corners.iter().sum::<Vec3>() / 3.0
+    };
+    let middle = new.patch.iter().map(at).sum::<Vec3>() / new.patch.len() as f64;
+    let shred = new.patch.iter().filter(|f| (at(f) - middle).norm() < 0.05);
+    let base = mesh.positions.len() as u32;
+    mesh.positions.extend(&new.welded.mesh.positions);
+    mesh.faces
+        .extend(shred.map(|f| new.welded.mesh.faces[*f].map(|v| v + base)));
+    let report = mended(&packed(&mesh, &[]), &Constraints::default())
+        .unwrap()
+        .report;
+    assert_eq!(report.holes.len(), 1);
+    assert!(
+        spoken(&report.holes[0].notes),
+        "{:?}",
+        report.holes[0].notes
+    );
+}
+
+#[test]
+fn more_holes_than_are_filled_at_once_are_refused() {
+    let mender = Mender {
+        networks: Networks::new(
+            Network::load(WEIGHTS, BackendKind::default()).unwrap(),
+            Vec::new(),
+        ),
+        limits: Limits {
+            holes: 1,
+            ..Limits::default()
+        },
+    };
+    let scan = read(&pair());
+    let error = mend(&scan, &Constraints::default(), &mender).unwrap_err();
+    assert_eq!(error.code(), "too_many_holes");
+    assert!(error.to_string().contains("2 holes"), "{error}");
+}
+
+#[test]
+fn what_nobody_waits_for_is_given_up() {
+    let scan = read(&pair());
+    let asked = AtomicUsize::new(0);
+    let call = Call {
+        mender: mender(),
+        // Gone when the second hole has been prepared.
+        wanted: &|| asked.fetch_add(1, Ordering::Relaxed) < 2,
+    };
+    let error = mend(&scan, &Constraints::default(), call).unwrap_err();
+    assert!(matches!(error, MendError::Abandoned), "{error}");
 }
 
 #[test]
@@ -251,4 +323,96 @@ fn patches_of_two_layers_are_kept_off_each_other() {
         .map(|p| p.self_intersections)
         .sum();
     assert_eq!((cuts, told), (0, 0));
+}
+
+/// The JSON and the BIN chunk of a GLB.
+fn unpacked(glb: &[u8]) -> (serde_json::Value, Vec<u8>) {
+    let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    let (text, rest) = glb[20..].split_at(length);
+    (serde_json::from_slice(text).unwrap(), rest[8..].to_vec())
+}
+
+fn repacked(json: &serde_json::Value, bin: &[u8]) -> Vec<u8> {
+    let mut text = json.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let mut glb = b"glTF\x02\0\0\0".to_vec();
+    glb.extend((28 + text.len() as u32 + bin.len() as u32).to_le_bytes());
+    for (kind, chunk) in [(b"JSON", &text[..]), (b"BIN\0", bin)] {
+        glb.extend((chunk.len() as u32).to_le_bytes());
+        glb.extend(kind);
+        glb.extend(chunk);
+    }
+    glb
+}
+
+/// The scan under a skin of two joints, of which the second takes over along x; its node stands far off.
+fn skinned(glb: &[u8]) -> Vec<u8> {
+    use serde_json::json;
+    let points = super::cloth::read(glb).surface.positions;
+    let (mut json, mut bin) = unpacked(glb);
+    let joints = bin.len();
+    bin.extend([0_u8, 1, 0, 0].repeat(points.len()));
+    let weights = bin.len();
+    for point in &points {
+        let x = point.x.clamp(0.0, 1.0) as f32;
+        bin.extend([1.0 - x, x, 0.0, 0.0].map(f32::to_le_bytes).as_flattened());
+    }
+    let end = bin.len();
+    let mut push = |list: &str, value| {
+        let list = json[list].as_array_mut().unwrap();
+        list.push(value);
+        list.len() - 1
+    };
+    let mut attribute = |from: usize, to: usize, component: u32| {
+        let view = json!({"buffer": 0, "byteOffset": from, "byteLength": to - from});
+        let view = push("bufferViews", view);
+        let accessor = json!({"bufferView": view, "componentType": component, "type": "VEC4", "count": points.len()});
+        push("accessors", accessor)
+    };
+    let (joints, weights) = (
+        attribute(joints, weights, 5121),
+        attribute(weights, end, 5126),
+    );
+    let attributes = &mut json["meshes"][0]["primitives"][0]["attributes"];
+    attributes["JOINTS_0"] = json!(joints);
+    attributes["WEIGHTS_0"] = json!(weights);
+    json["nodes"] = json!([{"mesh": 0, "skin": 0, "translation": [100, 0, 0]}, {}, {}]);
+    json["scenes"] = json!([{"nodes": [0, 1, 2]}]);
+    json["skins"] = json!([{"joints": [1, 2]}]);
+    json["buffers"][0]["byteLength"] = json!(end);
+    repacked(&json, &bin)
+}
+
+#[test]
+fn a_patch_of_a_skinned_scan_moves_with_the_cloth_around_it() {
+    let flat = packed(&holed(&laid(|u, v| [u, v, 0.0]), &ROUND).mesh, &[]);
+    let mended = mended(&skinned(&flat), &Constraints::default()).unwrap();
+    let invented = Seen::of(&mended.bytes).invented();
+    assert!(
+        invented.iter().all(|p| p.x < 1.0),
+        "the transform of a skinned mesh's node does not count"
+    );
+    let (json, bin) = unpacked(&mended.bytes);
+    let index = |value: &serde_json::Value| value.as_u64().unwrap() as usize;
+    let attributes = &json["meshes"][0]["primitives"][1]["attributes"];
+    let span = |name: &str| {
+        let accessor = &json["accessors"][index(&attributes[name])];
+        let view = &json["bufferViews"][index(&accessor["bufferView"])];
+        &bin[index(&view["byteOffset"])..][..index(&view["byteLength"])]
+    };
+    let floats = |name: &str| -> Vec<f32> {
+        let (each, _) = span(name).as_chunks::<4>();
+        each.iter()
+            .map(|bytes| f32::from_le_bytes(*bytes))
+            .collect()
+    };
+    let (positions, weights) = (floats("POSITION"), floats("WEIGHTS_0"));
+    let (positions, weights) = (positions.as_chunks::<3>().0, weights.as_chunks::<4>().0);
+    assert_eq!(weights.len(), positions.len());
+    assert_eq!(span("JOINTS_0").len(), 8 * positions.len());
+    for (at, weights) in positions.iter().zip(weights) {
+        assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-6);
+        // No point of the hole is further from its rim than its radius, 0.13.
+        assert!((weights[1] - at[0]).abs() < 0.2, "{at:?} {weights:?}");
+    }
 }

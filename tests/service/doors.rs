@@ -136,6 +136,19 @@ async fn grpc_has_the_same_errors() {
         data: vec![0; 2048].into(),
         ..Default::default()
     };
+    let huge = ScanChunk {
+        data: vec![0; 5 << 20].into(),
+        ..Default::default()
+    };
+    let anchor = Anchor {
+        uv: vec![2.0, 2.0],
+        position: vec![0.0; 3],
+        ..Default::default()
+    };
+    let all_wrong = Constraints {
+        anchors: vec![anchor; 300],
+        ..Default::default()
+    };
     let cases = [
         (
             client.inpaint(chunks("cone", None)).await,
@@ -158,6 +171,16 @@ async fn grpc_has_the_same_errors() {
             "invalid_constraints",
         ),
         (
+            client.inpaint(chunks("cloth", Some(all_wrong))).await,
+            Code::InvalidArgument,
+            "invalid_constraints",
+        ),
+        (
+            client.inpaint(tokio_stream::iter([huge])).await,
+            Code::ResourceExhausted,
+            "message_too_large",
+        ),
+        (
             client.inpaint(chunks("", None)).await,
             Code::InvalidArgument,
             "empty_body",
@@ -178,8 +201,11 @@ async fn grpc_has_the_same_errors() {
             .unwrap()
             .to_bytes()
             .unwrap();
-        let document: Value = serde_json::from_slice(&document).unwrap();
-        assert_eq!(document["code"], word);
+        let parsed: Value = serde_json::from_slice(&document).unwrap();
+        assert_eq!(parsed["code"], word);
+        // With what base64 adds, well within the 8 KiB of headers that some clients take.
+        assert!(document.len() <= 3 << 10, "{}", document.len());
+        assert!(status.message().len() <= 600);
     }
 }
 

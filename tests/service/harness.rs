@@ -14,7 +14,7 @@ use darn::{
     contract::{Anchor, Constraints, FieldError, Search, v1},
     serve::{
         App, Class, Kept, Mended, Menders, PatchForm, Patches, Refusal, ServeArgs, ServeError,
-        Sockets, serve,
+        Sockets, Wanted, serve,
     },
 };
 use reqwest::{Body, Method, RequestBuilder, Response, StatusCode};
@@ -226,7 +226,12 @@ impl Kept for FakeKept {
         size.unwrap_or(10_000)
     }
 
-    fn patches(&self, constraints: &Constraints, form: PatchForm) -> Result<Patches, Refusal> {
+    fn patches(
+        &self,
+        constraints: &Constraints,
+        form: PatchForm,
+        _: Wanted<'_>,
+    ) -> Result<Patches, Refusal> {
         self.act(constraints)?;
         let positions = constraints.anchors.iter().flat_map(|a| a.position);
         let bytes = match form {
@@ -239,7 +244,7 @@ impl Kept for FakeKept {
         })
     }
 
-    fn mended(&self, constraints: &Constraints) -> Result<Mended, Refusal> {
+    fn mended(&self, constraints: &Constraints, _: Wanted<'_>) -> Result<Mended, Refusal> {
         let xs: Vec<f64> = constraints.anchors.iter().map(|a| a.position[0]).collect();
         Ok(Mended {
             bytes: format!("glTF {} {xs:?}", self.scan).into_bytes(),
@@ -247,13 +252,18 @@ impl Kept for FakeKept {
         })
     }
 
-    fn optimize_anchor(&self, search: &Search) -> Result<v1::AnchorFound, Refusal> {
+    fn optimize_anchor(&self, search: &Search, _: Wanted<'_>) -> Result<v1::AnchorFound, Refusal> {
         Ok(found(search))
     }
 }
 
 impl Menders for Fake {
-    fn inpaint(&self, scan: &[u8], constraints: &Constraints) -> Result<Mended, Refusal> {
+    fn inpaint(
+        &self,
+        scan: &[u8],
+        constraints: &Constraints,
+        _: Wanted<'_>,
+    ) -> Result<Mended, Refusal> {
         self.act(scan)?;
         Ok(Mended {
             bytes: [b"glTF ", scan].concat(),
@@ -261,12 +271,22 @@ impl Menders for Fake {
         })
     }
 
-    fn optimize_anchor(&self, scan: &[u8], search: &Search) -> Result<v1::AnchorFound, Refusal> {
+    fn optimize_anchor(
+        &self,
+        scan: &[u8],
+        search: &Search,
+        _: Wanted<'_>,
+    ) -> Result<v1::AnchorFound, Refusal> {
         self.act(scan)?;
         Ok(found(search))
     }
 
-    fn mend_to_target(&self, scan: &[u8], search: &Search) -> Result<Mended, Refusal> {
+    fn mend_to_target(
+        &self,
+        scan: &[u8],
+        search: &Search,
+        wanted: Wanted<'_>,
+    ) -> Result<Mended, Refusal> {
         let anchor = Anchor {
             hole: search.hole,
             uv: None,
@@ -278,10 +298,10 @@ impl Menders for Fake {
             anchors,
             ..Constraints::default()
         };
-        self.inpaint(scan, &constraints)
+        self.inpaint(scan, &constraints, wanted)
     }
 
-    fn open(&self, scan: &[u8], _: &Constraints) -> Result<Box<dyn Kept>, Refusal> {
+    fn open(&self, scan: &[u8], _: &Constraints, _: Wanted<'_>) -> Result<Box<dyn Kept>, Refusal> {
         self.act(scan)?;
         Ok(Box::new(FakeKept::new(self, scan)))
     }

@@ -172,3 +172,44 @@ fn settings_out_of_bounds_are_refused_by_name() {
         );
     }
 }
+
+#[tokio::test]
+async fn who_says_nothing_is_let_go() {
+    let service = Service::start(&["--body-timeout", "300ms"]).await;
+    let answered = b"GET /livez HTTP/1.1\r\nhost: x\r\n\r\n".as_slice();
+    let cases = [
+        b"".as_slice(),
+        b"POST".as_slice(),
+        b"POST /inpaint HTTP/1.1\r\nhost: x\r\n".as_slice(),
+        b"PRI * HTTP/2.0\r\n".as_slice(),
+        answered,
+    ];
+    for begun in cases {
+        let mut stream = TcpStream::connect(service.address).await.unwrap();
+        stream.write_all(begun).await.unwrap();
+        let mut answer = Vec::new();
+        let ended = timeout(PATIENCE, stream.read_to_end(&mut answer)).await;
+        // Closed or reset, but over.
+        ended.expect("still open").ok();
+        assert_eq!(answer.starts_with(b"HTTP/1.1 200"), begun == answered);
+    }
+}
+
+#[tokio::test]
+async fn who_takes_no_answer_is_let_go() {
+    // More than the sockets between them hold.
+    const SCAN: usize = 32 << 20;
+    let service = Service::start(&["--body-timeout", "300ms"]).await;
+    let head = format!(
+        "POST /inpaint HTTP/1.1\r\nhost: x\r\ncontent-type: model/gltf-binary\r\ncontent-length: {SCAN}\r\n\r\n"
+    );
+    let mut stream = TcpStream::connect(service.address).await.unwrap();
+    stream.write_all(head.as_bytes()).await.unwrap();
+    stream.write_all(&vec![7; SCAN]).await.unwrap();
+    assert_eq!(status(&mut stream).await, "HTTP/1.1 200");
+    tokio::time::sleep(Duration::from_secs(2)).await;
+    let mut rest = Vec::new();
+    let ended = timeout(PATIENCE, stream.read_to_end(&mut rest)).await;
+    ended.expect("still open").ok();
+    assert!(rest.len() < SCAN, "the whole answer was kept for it");
+}
