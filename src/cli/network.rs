@@ -9,10 +9,14 @@ use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 /// The weights that are used when none are named; the first are the default ones.
-const SHIPPED: [(&str, &[u8]); 2] = [
+const SHIPPED: [(&str, &[u8]); 3] = [
     (
         STANDARD,
         include_bytes!("../../weights/standard.safetensors"),
+    ),
+    (
+        "gravity.safetensors",
+        include_bytes!("../../weights/gravity.safetensors"),
     ),
     (
         "interpen.safetensors",
@@ -92,4 +96,24 @@ fn settings(backend: Backend, autodiff: Autodiff) -> Result<Settings, Failure> {
         autodiff,
         engine: darn::net::engine::Options { isa: None, threads },
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shipped_weights_are_called_as_their_files_are() {
+        let args = NetworkArgs {
+            weights: None,
+            backend: Backend::Engine,
+            autodiff: Autodiff::Engine,
+        };
+        let Ok(mender) = mender(&args) else {
+            panic!("the shipped weights do not load");
+        };
+        let files = SHIPPED.map(|(file, _)| file.trim_end_matches(".safetensors"));
+        assert_eq!(mender.networks.names(), files);
+        assert_eq!(mender.networks.default().card().name, "standard");
+    }
 }

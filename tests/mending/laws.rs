@@ -1,11 +1,14 @@
 //! What must hold of every mended scan.
 
 use darn::contract::Constraints;
-use darn::mesh::Vec2;
+use darn::mend::{Limits, Mender, mend};
 use darn::mesh::loops::LoopKind;
+use darn::mesh::{TriMesh, Vec2, Vec3};
+use darn::net::{BackendKind, Network, Networks};
 use darn::scarffolds::scanned::Hole;
+use nalgebra::Rotation3;
 
-use super::cloth::{ROUND, Seen, area, holed, laid, mended, packed, sheet};
+use super::cloth::{ROUND, Seen, WEIGHTS, area, holed, laid, mended, packed, read, sheet};
 
 fn holes() -> [Hole; 3] {
     let centre = Vec2::new(0.47, 0.52);
@@ -93,6 +96,49 @@ fn the_same_scan_gives_the_same_bytes() {
     let once = mended(&bytes, &Constraints::default()).unwrap().bytes;
     let again = mended(&bytes, &Constraints::default()).unwrap().bytes;
     assert!(once == again);
+}
+
+#[test]
+fn cloth_told_where_up_is_turns_with_it() {
+    let load = |bytes| Network::load(bytes, BackendKind::default()).unwrap();
+    let gravity = load(include_bytes!("../../weights/gravity.safetensors"));
+    let mender = Mender {
+        networks: Networks::new(load(WEIGHTS), vec![gravity]),
+        limits: Limits::default(),
+    };
+    let hanging = holed(sheet(1), &ROUND).mesh;
+    let invented = |turn: Rotation3<f64>, up: Vec3| {
+        let mesh = TriMesh {
+            positions: hanging.positions.iter().map(|p| turn * p).collect(),
+            faces: hanging.faces.clone(),
+        };
+        let asked = Constraints {
+            up: Some(up.into()),
+            ..Constraints::default()
+        };
+        let mended = mend(&read(&packed(&mesh, &[])), &asked, &mender).unwrap();
+        let weights = mended.report.weights.unwrap();
+        assert_eq!(weights.name, "gravity");
+        assert_eq!(mended.report.notes, [""; 0]);
+        let new = Seen::of(&mended.bytes).invented();
+        let back: Vec<Vec3> = new.iter().map(|p| turn.inverse() * p).collect();
+        back
+    };
+    let apart = |a: &[Vec3], b: &[Vec3]| {
+        assert_eq!(a.len(), b.len());
+        let each = a.iter().zip(b).map(|(a, b)| (a - b).norm());
+        each.fold(0.0, f64::max)
+    };
+    let turn = Rotation3::from_euler_angles(0.4, -0.9, 2.0);
+    let (upright, tilted, sideways) = (
+        invented(Rotation3::identity(), Vec3::z()),
+        invented(turn, turn * Vec3::z()),
+        invented(Rotation3::identity(), Vec3::x()),
+    );
+    // It does not make much of it; but turned with the cloth, it says the same.
+    let [turned, told] = [&tilted, &sideways].map(|other| apart(&upright, other));
+    assert!(told > 1.0e-4, "{told}");
+    assert!(turned < 0.2 * told, "{turned}, {told}");
 }
 
 #[test]
