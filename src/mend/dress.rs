@@ -110,6 +110,7 @@ pub fn addition(
         material_of: part,
         points: points.collect(),
         faces: dressed.faces,
+        both_sides: is_backed(region, cloth),
         normals: dressed
             .corners
             .iter()
@@ -120,6 +121,13 @@ pub fn addition(
         name: format!("darn reconstruction of hole {}", report.id),
         extras: provenance(report, card),
     })
+}
+
+/// Whether most of a region shows its other side by triangles of its own.
+fn is_backed(region: &Region, cloth: &Cloth) -> bool {
+    let backed = region.faces.iter();
+    let backed = backed.filter(|f| cloth.welded.backed[**f as usize]).count();
+    2 * backed > region.faces.len()
 }
 
 /// The part that the largest number of rim edges belongs to; the first of them on a tie.

@@ -13,6 +13,8 @@ pub struct Welded {
     /// Faces of the soup left out: two corners in one place, the same three places as an earlier face (whichever side it
     /// shows), or an index out of range.
     pub dropped: usize,
+    /// Per welded face whether one of those left out shows its other side.
+    pub backed: Vec<bool>,
     /// The twins of the welded mesh's half-edges, when no two sheets of the soup share an edge: else splitting them pairs more.
     twin: Option<Vec<u32>>,
 }
@@ -34,7 +36,7 @@ impl Welded {
 /// run the same way (a sheet crossed by such an edge up to its border is slit there). The result depends on the order of faces only, not on how the soup numbered its vertices. Near linear.
 pub fn weld(soup: &TriMesh) -> Welded {
     let place = places(soup);
-    let face_of = distinct_faces(&soup.faces, &place);
+    let (face_of, backed) = distinct_faces(&soup.faces, &place);
     let faces: Vec<[u32; 3]> = face_of
         .iter()
         .map(|&f| soup.faces[f as usize].map(|v| place[v as usize]))
@@ -56,12 +58,13 @@ pub fn weld(soup: &TriMesh) -> Welded {
         },
         face_of,
         dropped,
+        backed,
         twin: unpaired.is_empty().then_some(twin),
     }
 }
 
-/// The faces with three different places that no earlier face has, ascending.
-fn distinct_faces(faces: &[[u32; 3]], place: &[u32]) -> Vec<u32> {
+/// The faces with three different places that no earlier face has, ascending; and of each whether a later one has them the other way round.
+fn distinct_faces(faces: &[[u32; 3]], place: &[u32]) -> (Vec<u32>, Vec<bool>) {
     let places = |face: &[u32; 3]| match face.map(|v| place.get(v as usize)) {
         [Some(&a), Some(&b), Some(&c)] if a != b && b != c && c != a => {
             let mut key = [a, b, c];
@@ -83,17 +86,26 @@ fn distinct_faces(faces: &[[u32; 3]], place: &[u32]) -> Vec<u32> {
         sorted[fill[low as usize] as usize] = (middle, high, f);
         fill[low as usize] += 1;
     }
+    // Whether a face runs from its lowest place to the middle one: the turns of three corners that do are the same way round.
+    let rises = |f: u32| {
+        let [a, b, c] = faces[f as usize].map(|v| place[v as usize]);
+        (a < b && b < c) || (b < c && c < a) || (c < a && a < b)
+    };
     let mut first = vec![false; faces.len()];
+    let mut backed = vec![false; faces.len()];
     for s in starts.windows(2) {
         let bucket = &mut sorted[s[0] as usize..s[1] as usize];
         bucket.sort_unstable();
         for group in bucket.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
-            first[group[0].2 as usize] = true;
+            let (kept, rest) = (group[0].2, &group[1..]);
+            first[kept as usize] = true;
+            backed[kept as usize] = rest.iter().any(|other| rises(other.2) != rises(kept));
         }
     }
     (0..faces.len() as u32)
         .filter(|&f| first[f as usize])
-        .collect()
+        .map(|f| (f, backed[f as usize]))
+        .unzip()
 }
 
 #[cfg(test)]
@@ -168,6 +180,23 @@ mod tests {
             prop_assert_eq!(vertices.len(), count);
             prop_assert_eq!(count, topology.twin.iter().filter(|&&t| t == NONE).count());
         }
+    }
+
+    #[test]
+    fn faces_that_show_their_other_side_too_are_told_apart() {
+        let front = sheet(3, |_, _| true, |u, v| Vec3::new(u, v, 0.0));
+        let faces = front.faces.iter().enumerate();
+        let back = TriMesh {
+            faces: faces
+                .filter(|(k, _)| k % 2 == 0)
+                .map(|(_, [a, b, c])| [*c, *b, *a])
+                .collect(),
+            ..front.clone()
+        };
+        let both = weld(&together(&together(&front, &back), &front));
+        assert_eq!(both.mesh.faces.len(), front.faces.len());
+        let expected: Vec<bool> = (0..front.faces.len()).map(|k| k % 2 == 0).collect();
+        assert_eq!(both.backed, expected);
     }
 
     #[test]

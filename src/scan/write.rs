@@ -25,6 +25,8 @@ pub struct Addition {
     pub points: Vec<PatchPoint>,
     /// Triangles over `points`, counter-clockwise in scene space.
     pub faces: Vec<[u32; 3]>,
+    /// Whether it is drawn once more with its other side out, as scans are that have two triangles for each piece of cloth.
+    pub both_sides: bool,
     /// Normals in scene space, of any length but zero; not read if the part has none.
     pub normals: Vec<Vec3>,
     /// Texture coordinate sets.
@@ -70,8 +72,11 @@ pub(super) fn write(scan: &Scan, additions: &[Addition]) -> Result<Vec<u8>, Scan
             }),
             None => None,
         };
-        let primitive = patch.primitive(&mut out, material);
-        out.primitive(patch.home.mesh, primitive);
+        let front = patch.primitive(&mut out, material);
+        let back = (addition.both_sides).then(|| patch.back(&mut out, &front));
+        for primitive in [front].into_iter().chain(back) {
+            out.primitive(patch.home.mesh, primitive);
+        }
     }
     out.finish()
 }
@@ -297,7 +302,7 @@ impl<'s> Patch<'s> {
         };
         let mut primitive = Map::new();
         primitive.insert("attributes".into(), Value::Object(attributes));
-        primitive.insert("indices".into(), self.indices(out));
+        primitive.insert("indices".into(), self.indices(out, false));
         if let Some(material) = material {
             primitive.insert("material".into(), json!(material));
         }
@@ -307,6 +312,24 @@ impl<'s> Patch<'s> {
         }
         primitive.insert("extras".into(), json!({ "darn": addition.extras }));
         Value::Object(primitive)
+    }
+
+    /// A primitive with its other side out: it shares all but normals and indices.
+    fn back(&self, out: &mut Appender<'_>, front: &Value) -> Value {
+        let mut back = front.clone();
+        back["indices"] = self.indices(out, true);
+        if self.look.normals.is_some() {
+            let inward: Vec<[f32; 3]> = self.normals().iter().map(|n| n.map(|x| -x)).collect();
+            back["attributes"]["NORMAL"] = out.accessor(Content {
+                name: &self.addition.name,
+                target: Target::Vertices,
+                component: ComponentType::F32,
+                kind: Type::Vec3,
+                bytes: bytes_of(&inward),
+                bounds: None,
+            });
+        }
+        back
     }
 
     /// Appends the joints of one set.
@@ -351,14 +374,14 @@ impl<'s> Patch<'s> {
         (self.look.node == self.home.node && unit).then_some(stored)
     }
 
-    /// Appends the triangles, turned round where the node's transform will turn them again.
-    fn indices(&self, out: &mut Appender<'_>) -> Value {
-        let mirrored = self.home.placement.mirrors();
+    /// Appends the triangles, turned round where the node's transform will turn them again, and for the back.
+    fn indices(&self, out: &mut Appender<'_>, back: bool) -> Value {
+        let turned = self.home.placement.mirrors() != back;
         let faces = self
             .addition
             .faces
             .iter()
-            .map(|&[a, b, c]| if mirrored { [a, c, b] } else { [a, b, c] });
+            .map(|&[a, b, c]| if turned { [a, c, b] } else { [a, b, c] });
         // 65535 is not an index but a restart in u16.
         let (component, bytes) = if self.points.len() <= usize::from(u16::MAX) {
             (

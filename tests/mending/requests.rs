@@ -172,6 +172,38 @@ fn a_loose_piece_in_the_hole_is_told_of() {
 }
 
 #[test]
+fn cloth_with_a_triangle_for_either_side_gets_a_patch_with_both() {
+    let single = holed(sheet(0), &ROUND).mesh;
+    let mut double = single.clone();
+    let base = single.positions.len() as u32;
+    double.positions.extend(&single.positions);
+    double.faces.extend(
+        single
+            .faces
+            .iter()
+            .map(|[a, b, c]| [c + base, b + base, a + base]),
+    );
+    let [one, both] = [&single, &double].map(|mesh| {
+        let mended = mended(&packed(mesh, &[]), &Constraints::default()).unwrap();
+        let scan = read(&mended.bytes);
+        let new = scan.parts.iter().filter(|part| part.reconstructed);
+        let faces: Vec<[[u64; 3]; 3]> = new
+            .flat_map(|part| {
+                &scan.surface.faces[part.faces.start as usize..part.faces.end as usize]
+            })
+            .map(|f| {
+                f.map(|v| <[f64; 3]>::from(scan.surface.positions[v as usize]).map(f64::to_bits))
+            })
+            .collect();
+        faces
+    });
+    let (front, back) = both.split_at(both.len() / 2);
+    assert_eq!(front, one);
+    let turned: Vec<_> = front.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+    assert_eq!(back, turned);
+}
+
+#[test]
 fn more_holes_than_are_filled_at_once_are_refused() {
     let mender = Mender {
         networks: Networks::new(
