@@ -86,10 +86,14 @@ fn distinct_faces(faces: &[[u32; 3]], place: &[u32]) -> (Vec<u32>, Vec<bool>) {
         sorted[fill[low as usize] as usize] = (middle, high, f);
         fill[low as usize] += 1;
     }
-    // Whether a face runs from its lowest place to the middle one: the turns of three corners that do are the same way round.
+    // Of three places in a row, round and round, two steps go up or one does: by which way round the face is.
     let rises = |f: u32| {
         let [a, b, c] = faces[f as usize].map(|v| place[v as usize]);
-        (a < b && b < c) || (b < c && c < a) || (c < a && a < b)
+        [(a, b), (b, c), (c, a)]
+            .iter()
+            .filter(|(from, to)| from < to)
+            .count()
+            == 2
     };
     let mut first = vec![false; faces.len()];
     let mut backed = vec![false; faces.len()];
