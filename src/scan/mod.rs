@@ -8,6 +8,7 @@
 
 mod accessor;
 mod append;
+mod attributes;
 mod buffers;
 mod container;
 mod error;

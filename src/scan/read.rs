@@ -1,23 +1,20 @@
 //! From the file's bytes to the soup of triangles.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::sync::Arc;
 
 use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::mesh::{TRIANGLE_FAN, TRIANGLE_STRIP, TRIANGLES};
 use serde_json::Value;
 
 use super::accessor::{Accessor, is_unsigned};
+use super::attributes::Attributes;
 use super::buffers::Document;
 use super::json::{Place, values_at_most};
 use super::scene::{Drawn, drawn};
-use super::skin::{Influence, Influences, skinned_meshes};
+use super::skin::skinned_meshes;
 use super::triangles::Runs;
 use super::{Block, Limits, Part, Scan, ScanError};
 use crate::mesh::{TriMesh, Vec3};
-
-type Uvs = Arc<[[f32; 2]]>;
-type Rgba = Arc<[[f32; 4]]>;
 
 const DRACO: &str = "KHR_draco_mesh_compression";
 const QUANTIZED: &str = "KHR_mesh_quantization";
@@ -89,7 +86,7 @@ fn offset_of(text: &[u8], line: usize, column: usize) -> usize {
     lines.map(|line| line.len() + 1).sum::<usize>() + column.saturating_sub(1)
 }
 
-fn within(
+pub(super) fn within(
     allowed: usize,
     limit: &'static str,
     found: usize,
@@ -113,13 +110,8 @@ struct Reader<'d, 'a> {
     parts: Vec<Part>,
     blocks: Vec<Block>,
     met: BTreeSet<usize>,
-    /// Texture coordinate and colour sets by accessor: primitives and instances share them.
-    texcoords: HashMap<usize, Uvs>,
-    colors: HashMap<usize, (Type, Rgba)>,
-    /// Sets of joints and weights, likewise, by the accessors of both.
-    influences: HashMap<(usize, usize), Influences>,
+    attributes: Attributes<'d, 'a>,
     skinned: BTreeSet<usize>,
-    attribute_values: usize,
     primitives: usize,
     faces: usize,
 }
@@ -133,11 +125,8 @@ impl<'d, 'a> Reader<'d, 'a> {
             parts: Vec::new(),
             blocks: Vec::new(),
             met: BTreeSet::new(),
-            texcoords: HashMap::new(),
-            colors: HashMap::new(),
-            influences: HashMap::new(),
+            attributes: Attributes::new(document, limits),
             skinned: skinned_meshes(document.root.value),
-            attribute_values: 0,
             primitives: 0,
             faces: 0,
         }
@@ -216,14 +205,14 @@ impl<'d, 'a> Reader<'d, 'a> {
                     [start + a, start + b, start + c]
                 }),
         );
-        let normals = self.normals(&attributes, count)?;
+        let normals = self.attributes.normals(&attributes, count)?;
         let (texcoords, (color_kinds, colors)) = (
-            self.texcoords(&attributes, count)?,
-            self.colors(&attributes, count)?,
+            self.attributes.texcoords(&attributes, count)?,
+            self.attributes.colors(&attributes, count)?,
         );
         let skinned = self.skinned.contains(&drawn.mesh);
         let skinning = skinned
-            .then(|| self.influences(&attributes, count))
+            .then(|| self.attributes.influences(&attributes, count))
             .transpose()?;
         let material = match place.get("material")? {
             Some(reference) => Some(self.document.root.referred("materials", &reference)?.0),
@@ -353,178 +342,4 @@ impl<'d, 'a> Reader<'d, 'a> {
         self.faces = self.faces.saturating_add(faces);
         within(self.limits.max_faces, "max_faces", self.faces, pointer)
     }
-
-    /// The normals, if there are any; NaN and infinities read as 0.
-    fn normals(
-        &mut self,
-        attributes: &Place<'a>,
-        vertices: usize,
-    ) -> Result<Option<Arc<[[f32; 3]]>>, ScanError> {
-        let Some(reference) = attributes.get("NORMAL")? else {
-            return Ok(None);
-        };
-        let (_, place) = self.document.root.referred("accessors", &reference)?;
-        let accessor = self.attribute(&place, &[Type::Vec3])?;
-        let normals: Arc<[_]> = (accessor.floats([0.0; 3])?.into_iter())
-            .map(|normal| normal.map(tame))
-            .collect();
-        same_count(&place, normals.len(), vertices)?;
-        Ok(Some(normals))
-    }
-
-    fn texcoords(
-        &mut self,
-        attributes: &Place<'a>,
-        vertices: usize,
-    ) -> Result<Vec<Uvs>, ScanError> {
-        let mut sets = Vec::new();
-        while let Some(reference) = attributes.get(&format!("TEXCOORD_{}", sets.len()))? {
-            let (key, place) = self.document.root.referred("accessors", &reference)?;
-            let set = match self.texcoords.get(&key) {
-                Some(set) => Arc::clone(set),
-                None => {
-                    let accessor = self.attribute(&place, &[Type::Vec2])?;
-                    let set: Arc<[_]> = accessor
-                        .floats([0.0; 2])?
-                        .into_iter()
-                        .map(|uv| uv.map(tame))
-                        .collect();
-                    self.texcoords.insert(key, Arc::clone(&set));
-                    set
-                }
-            };
-            same_count(&place, set.len(), vertices)?;
-            sets.push(set);
-            within(
-                self.limits.max_attribute_sets,
-                "max_attribute_sets",
-                sets.len(),
-                &attributes.pointer,
-            )?;
-        }
-        Ok(sets)
-    }
-
-    /// The colour sets and, beside them, their types in the file.
-    fn colors(
-        &mut self,
-        attributes: &Place<'a>,
-        vertices: usize,
-    ) -> Result<(Vec<Type>, Vec<Rgba>), ScanError> {
-        let (mut kinds, mut sets) = (Vec::new(), Vec::new());
-        while let Some(reference) = attributes.get(&format!("COLOR_{}", sets.len()))? {
-            let (key, place) = self.document.root.referred("accessors", &reference)?;
-            let (kind, set) = match self.colors.get(&key) {
-                Some((kind, set)) => (*kind, Arc::clone(set)),
-                None => {
-                    let accessor = self.attribute(&place, &[Type::Vec3, Type::Vec4])?;
-                    let set = accessor
-                        .floats([0.0, 0.0, 0.0, 1.0])?
-                        .into_iter()
-                        .map(|rgba| rgba.map(tame));
-                    let set: Arc<[_]> = set.collect();
-                    self.colors.insert(key, (accessor.kind, Arc::clone(&set)));
-                    (accessor.kind, set)
-                }
-            };
-            same_count(&place, set.len(), vertices)?;
-            kinds.push(kind);
-            sets.push(set);
-            within(
-                self.limits.max_attribute_sets,
-                "max_attribute_sets",
-                sets.len(),
-                &attributes.pointer,
-            )?;
-        }
-        Ok((kinds, sets))
-    }
-
-    /// The sets of joints and weights, as far as both are there.
-    fn influences(
-        &mut self,
-        attributes: &Place<'a>,
-        vertices: usize,
-    ) -> Result<Vec<Influences>, ScanError> {
-        let mut sets = Vec::new();
-        while let (Some(joints), Some(weights)) = (
-            attributes.get(&format!("JOINTS_{}", sets.len()))?,
-            attributes.get(&format!("WEIGHTS_{}", sets.len()))?,
-        ) {
-            let (of_joints, joints) = self.document.root.referred("accessors", &joints)?;
-            let (of_weights, weights) = self.document.root.referred("accessors", &weights)?;
-            let key = (of_joints, of_weights);
-            let set = match self.influences.get(&key) {
-                Some(set) => Arc::clone(set),
-                None => {
-                    let set = self.weighted_joints(&joints, &weights, vertices)?;
-                    self.influences.insert(key, Arc::clone(&set));
-                    set
-                }
-            };
-            same_count(&joints, set.len(), vertices)?;
-            sets.push(set);
-            within(
-                self.limits.max_attribute_sets,
-                "max_attribute_sets",
-                sets.len(),
-                &attributes.pointer,
-            )?;
-        }
-        Ok(sets)
-    }
-
-    /// Decodes a JOINTS accessor and the WEIGHTS that go with it; negative weights read as 0.
-    fn weighted_joints(
-        &mut self,
-        joints: &Place<'a>,
-        weights: &Place<'a>,
-        vertices: usize,
-    ) -> Result<Influences, ScanError> {
-        let accessor = self.attribute(joints, &[Type::Vec4])?;
-        if ![ComponentType::U8, ComponentType::U16].contains(&accessor.component) {
-            return Err(joints.invalid("joints must be unsigned bytes or shorts"));
-        }
-        same_count(joints, accessor.count, vertices)?;
-        let of_joints = accessor.quadruples()?;
-        let accessor = self.attribute(weights, &[Type::Vec4])?;
-        same_count(weights, accessor.count, vertices)?;
-        let of_weights = accessor.floats([0.0; 4])?.into_iter();
-        let of_weights = of_weights.map(|weights| weights.map(|w| tame(w).max(0.0)));
-        let influences = of_joints.into_iter().zip(of_weights);
-        Ok(influences
-            .map(|(joints, weights)| Influence { joints, weights })
-            .collect())
-    }
-
-    /// Opens a vertex attribute and counts its values against the limit.
-    fn attribute(&mut self, place: &Place<'a>, kinds: &[Type]) -> Result<Accessor<'d>, ScanError> {
-        let accessor = Accessor::open(self.document, place)?;
-        if !kinds.contains(&accessor.kind) {
-            return Err(place.invalid(format!("must be one of {kinds:?} here")));
-        }
-        let values = accessor.count.saturating_mul(accessor.kind.multiplicity());
-        self.attribute_values = self.attribute_values.saturating_add(values);
-        within(
-            self.limits.max_attribute_values,
-            "max_attribute_values",
-            self.attribute_values,
-            &place.pointer,
-        )?;
-        Ok(accessor)
-    }
-}
-
-/// A file may carry NaN in attributes that nothing depends on; a patch must not spread it.
-fn tame(x: f32) -> f32 {
-    if x.is_finite() { x } else { 0.0 }
-}
-
-fn same_count(place: &Place<'_>, count: usize, vertices: usize) -> Result<(), ScanError> {
-    if count == vertices {
-        return Ok(());
-    }
-    Err(place.invalid(format!(
-        "has {count} elements, but the primitive has {vertices} vertices"
-    )))
 }

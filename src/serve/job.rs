@@ -40,9 +40,14 @@ pub struct Job<T, W> {
     pub admission: Admission,
 }
 
+/// Whether somebody still waits, and still may.
+fn is_waited_for<R>(reply: &oneshot::Sender<R>, deadline: Instant) -> bool {
+    !reply.is_closed() && Instant::now() < deadline
+}
+
 impl<T: Send, W: FnOnce(Wanted<'_>) -> T + Send> Entry for Job<T, W> {
     fn is_wanted(&self) -> bool {
-        !self.reply.is_closed() && Instant::now() < self.deadline
+        is_waited_for(&self.reply, self.deadline)
     }
 
     fn entered(&self) -> Instant {
@@ -59,7 +64,7 @@ impl<T: Send, W: FnOnce(Wanted<'_>) -> T + Send> Entry for Job<T, W> {
             ..
         } = *self;
         let _entered = span.enter();
-        let wanted = || !reply.is_closed() && Instant::now() < deadline;
+        let wanted = || is_waited_for(&reply, deadline);
         let mut outcome = catch_unwind(AssertUnwindSafe(|| work(&wanted))).map_err(|_| {
             metrics.panicked.increment(1);
             PoolError::Panicked

@@ -26,14 +26,17 @@ pub const ROUND: Hole = Hole::Circle {
     radius: 0.13,
 };
 
+/// A network that ships.
+pub fn network(weights: &[u8]) -> Network {
+    Network::load(weights, BackendKind::default()).expect("the shipped weights load")
+}
+
 /// The mender, loaded once for all tests.
 pub fn mender() -> &'static Arc<Mender> {
     static MENDER: OnceLock<Arc<Mender>> = OnceLock::new();
     MENDER.get_or_init(|| {
-        let standard =
-            Network::load(WEIGHTS, BackendKind::default()).expect("the shipped weights load");
         Arc::new(Mender {
-            networks: Networks::new(standard, Vec::new()),
+            networks: Networks::new(network(WEIGHTS), Vec::new()),
             limits: Limits::default(),
         })
     })

@@ -4,11 +4,11 @@ use darn::contract::Constraints;
 use darn::mend::{Limits, Mender, mend};
 use darn::mesh::loops::LoopKind;
 use darn::mesh::{TriMesh, Vec2, Vec3};
-use darn::net::{BackendKind, Network, Networks};
+use darn::net::Networks;
 use darn::scarffolds::scanned::Hole;
 use nalgebra::Rotation3;
 
-use super::cloth::{ROUND, Seen, WEIGHTS, area, holed, laid, mended, packed, read, sheet};
+use super::cloth::{ROUND, Seen, WEIGHTS, area, holed, laid, mended, network, packed, read, sheet};
 
 fn holes() -> [Hole; 3] {
     let centre = Vec2::new(0.47, 0.52);
@@ -100,10 +100,9 @@ fn the_same_scan_gives_the_same_bytes() {
 
 #[test]
 fn cloth_told_where_up_is_turns_with_it() {
-    let load = |bytes| Network::load(bytes, BackendKind::default()).unwrap();
-    let gravity = load(include_bytes!("../../weights/gravity.safetensors"));
+    let gravity = network(include_bytes!("../../weights/gravity.safetensors"));
     let mender = Mender {
-        networks: Networks::new(load(WEIGHTS), vec![gravity]),
+        networks: Networks::new(network(WEIGHTS), vec![gravity]),
         limits: Limits::default(),
     };
     let hanging = holed(sheet(1), &ROUND).mesh;

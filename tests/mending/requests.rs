@@ -6,10 +6,12 @@ use darn::contract::{Anchor, Constraints, Edit, Gesture, HoleSelector};
 use darn::mend::{Call, Limits, MendError, Mender, mend};
 use darn::mesh::intersect::intersections_with;
 use darn::mesh::{TriMesh, Vec2, Vec3};
-use darn::net::{BackendKind, Network, Networks};
+use darn::net::Networks;
 use darn::scarffolds::scanned::Hole;
 
-use super::cloth::{ROUND, Seen, WEIGHTS, holed, laid, mended, mender, packed, read, sheet};
+use super::cloth::{
+    ROUND, Seen, WEIGHTS, holed, laid, mended, mender, network, packed, read, sheet,
+};
 
 /// Two sheets side by side, each with a hole; the second is moved along x.
 fn pair() -> Vec<u8> {
@@ -222,10 +224,7 @@ fn cloth_with_a_triangle_for_either_side_gets_a_patch_with_both() {
 #[test]
 fn more_holes_than_are_filled_at_once_are_refused() {
     let mender = Mender {
-        networks: Networks::new(
-            Network::load(WEIGHTS, BackendKind::default()).unwrap(),
-            Vec::new(),
-        ),
+        networks: Networks::new(network(WEIGHTS), Vec::new()),
         limits: Limits {
             holes: 1,
             ..Limits::default()
