@@ -3,17 +3,17 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use darn::flatten::{self, Chart};
-use darn::grid::{CELLS, Grid};
-use darn::mesh::loops::{LoopKind, boundary_loops};
-use darn::mesh::region::{Region, grow};
-use darn::mesh::weld::weld;
-use darn::mesh::{TriMesh, Vec3};
-use darn::net::engine::{Engine, Gradient, Input, Isa, Options, Scratch};
-use darn::net::weights;
-use darn::patch::{Hold, Pull};
-use darn::scan::Scan;
-use darn::{net, patch};
+use darn_geometry::flatten::{self, Chart};
+use darn_geometry::grid::{CELLS, Grid};
+use darn_geometry::mesh::loops::{LoopKind, boundary_loops};
+use darn_geometry::mesh::region::{Region, grow};
+use darn_geometry::mesh::weld::weld;
+use darn_geometry::mesh::{TriMesh, Vec3};
+use darn_geometry::patch;
+use darn_geometry::patch::{Hold, Pull};
+use darn_gltf_scan::Scan;
+use darn_net::engine::{Engine, Gradient, Input, Isa, Options, Scratch};
+use darn_net::weights;
 
 /// The hole of the example scan: its cloth, the cloth laid flat, and that sampled.
 struct Hole {
@@ -63,9 +63,9 @@ fn cloth(c: &mut Criterion) {
     let positions = hole.grid.normalised(&normal).positions;
     let known = &hole.grid.known;
     c.bench_function("plate", |b| {
-        b.iter(|| net::plate(black_box(&positions), known))
+        b.iter(|| darn_net::plate(black_box(&positions), known))
     });
-    let plate = net::plate(&positions, known).expect("a plate");
+    let plate = darn_net::plate(&positions, known).expect("a plate");
     let filled: Vec<Vec3> = (hole.grid.positions.iter().zip(known).zip(&plate))
         .map(|((own, known), q)| if *known { *own } else { normal.to_scene(q) })
         .collect();
@@ -78,7 +78,7 @@ fn cloth(c: &mut Criterion) {
     };
     c.bench_function("patch, unedited", |b| b.iter(|| made(&[])));
     let free = made(&[]);
-    let middle = free.flat.iter().sum::<darn::mesh::Vec2>() / free.flat.len() as f64;
+    let middle = free.flat.iter().sum::<darn_geometry::mesh::Vec2>() / free.flat.len() as f64;
     let pull = Pull {
         at: middle,
         to: free.at(middle) + Vec3::new(0.0, 0.02, 0.0),

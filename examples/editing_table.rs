@@ -8,16 +8,18 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use clap::Parser;
-use darn::contract::{Anchor, Constraints, Edit, Gesture, Search};
-use darn::mend::{Limits, Mender, Response, Session};
-use darn::mesh::curvature::vertex_normals;
-use darn::mesh::{Vec2, Vec3};
-use darn::net::{BackendKind, Network, Networks};
-use darn::scan::export::{Fresh, glb};
-use darn::scan::{self, Scan};
-use darn::scarffolds::scanned::{Hole, scanned};
-use darn::scarffolds::sheets;
-use darn::scarffolds::sheets::Sheet;
+use darn_contract::port::Cancellation;
+use darn_contract::{Anchor, Constraints, Edit, Gesture, Search};
+use darn_geometry::mesh::curvature::vertex_normals;
+use darn_geometry::mesh::{Vec2, Vec3};
+use darn_gltf_scan::Scan;
+use darn_gltf_scan::export::{Fresh, glb};
+use darn_lab::scarffolds::scanned::{Hole, scanned};
+use darn_lab::scarffolds::sheets;
+use darn_lab::scarffolds::sheets::Sheet;
+use darn_mend::{Limits, NetworkMender, Response, ScanSession};
+use darn_net::engine::Options;
+use darn_net::{Network, Networks};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -38,9 +40,8 @@ struct Args {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let args = Args::parse();
-    let standard = Network::load(&std::fs::read(&args.weights)?, BackendKind::default())?;
-    let mender = Arc::new(Mender {
-        networks: Networks::new(standard, Vec::new()),
+    let standard = Network::load(&std::fs::read(&args.weights)?, Options::default())?;
+    let mender = Arc::new(NetworkMender {
         limits: Limits {
             response: match args.response.as_str() {
                 "plain" => Response::Plain,
@@ -48,6 +49,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             },
             ..Limits::default()
         },
+        ..NetworkMender::new(Networks::new(standard, Vec::new()))
     });
     let sheets = sheets::read(&args.sheets)?;
     let mut rng = ChaCha8Rng::seed_from_u64(7);
@@ -85,7 +87,7 @@ fn hole(k: usize, rng: &mut ChaCha8Rng) -> Hole {
 
 /// A session on a sheet with a hole.
 struct Case {
-    session: Session,
+    session: ScanSession,
     positions: Vec<Vec3>,
     uvs: Vec<Vec2>,
     rim: usize,
@@ -114,7 +116,7 @@ impl Case {
     fn open(
         sheet: &Sheet,
         hole: &Hole,
-        mender: &Arc<Mender>,
+        mender: &Arc<NetworkMender>,
         rng: &mut ChaCha8Rng,
     ) -> Option<Case> {
         let mesh = scanned(sheet, 45, hole, rng).mesh;
@@ -130,9 +132,15 @@ impl Case {
             texcoords: &[],
             faces: &mesh.faces,
         };
-        let scan = Scan::read(&glb(&fresh).ok()?, &scan::Limits::default()).ok()?;
+        let scan = Scan::read(&glb(&fresh).ok()?, &darn_gltf_scan::Limits::default()).ok()?;
         let started = Instant::now();
-        let session = Session::open(scan, &Constraints::default(), Arc::clone(mender)).ok()?;
+        let session = ScanSession::open(
+            scan,
+            &Constraints::default(),
+            Arc::clone(mender),
+            Cancellation::NEVER,
+        )
+        .ok()?;
         let open_ms = started.elapsed().as_secs_f64() * 1e3;
         let described = session.described();
         let hole = described.holes.iter().max_by_key(|h| h.hole_cells.len())?;
@@ -143,7 +151,10 @@ impl Case {
         let rim = hole.rim_uvs.len() / 2;
         let low = uvs[..rim].iter().fold(Vec2::repeat(1.0), |m, uv| m.inf(uv));
         let high = uvs[..rim].iter().fold(Vec2::zeros(), |m, uv| m.sup(uv));
-        let (positions, report) = session.positions(&Constraints::default()).ok()?;
+        let (positions, report) = session
+            .call(Cancellation::NEVER)
+            .positions(&Constraints::default())
+            .ok()?;
         let cell = report.holes.get(place)?.grid?.spacing_mean;
         (described.holes.len() == 1 && uvs.len() > rim).then(|| Case {
             positions: positions[0].clone(),
@@ -185,13 +196,9 @@ impl Case {
     }
 
     /// Distance to the anchor and how much of it is beyond reach, in cells; the largest stretch.
-    fn kept(
-        &self,
-        vertex: usize,
-        by: Vec3,
-    ) -> Result<([f64; 3], Vec<Vec3>), darn::mend::MendError> {
+    fn kept(&self, vertex: usize, by: Vec3) -> Result<([f64; 3], Vec<Vec3>), darn_mend::MendError> {
         let asked = anchored(vec![self.anchor(vertex, by)]);
-        let (mut positions, report) = self.session.positions(&asked)?;
+        let (mut positions, report) = self.session.call(Cancellation::NEVER).positions(&asked)?;
         let hole = &report.holes[0];
         let (anchor, patch) = (&hole.anchors[0], hole.patch.clone().unwrap_or_default());
         let numbers = [
@@ -202,11 +209,14 @@ impl Case {
         Ok((numbers, positions.remove(0)))
     }
 
-    fn measure(&self, rng: &mut ChaCha8Rng) -> Result<Row, darn::mend::MendError> {
+    fn measure(&self, rng: &mut ChaCha8Rng) -> Result<Row, darn_mend::MendError> {
         let still: Vec<Anchor> = (0..3)
             .map(|_| self.anchor(self.vertex(rng), Vec3::zeros()))
             .collect();
-        let (positions, plain) = self.session.positions(&anchored(still))?;
+        let (positions, plain) = self
+            .session
+            .call(Cancellation::NEVER)
+            .positions(&anchored(still))?;
         let squares = positions[0].iter().zip(&self.positions).skip(self.rim);
         let squares: f64 = squares.map(|(a, b)| (a - b).norm_squared()).sum();
         let still = (squares / (self.uvs.len() - self.rim) as f64).sqrt() / self.cell;
@@ -231,10 +241,12 @@ impl Case {
                 offset: (normal * self.cell).into(),
             },
         };
-        self.session.positions(&Constraints {
-            edits: vec![grab],
-            ..Constraints::default()
-        })?;
+        self.session
+            .call(Cancellation::NEVER)
+            .positions(&Constraints {
+                edits: vec![grab],
+                ..Constraints::default()
+            })?;
         let edit_ms = started.elapsed().as_secs_f64() * 1e3;
         Ok(Row {
             still,
@@ -246,7 +258,7 @@ impl Case {
         })
     }
 
-    fn search(&self, rng: &mut ChaCha8Rng) -> Result<[f64; 9], darn::mend::MendError> {
+    fn search(&self, rng: &mut ChaCha8Rng) -> Result<[f64; 9], darn_mend::MendError> {
         let by = direction(rng) * rng.random_range(0.0..3.0) * self.cell;
         let search = Search {
             hole: None,
@@ -255,11 +267,17 @@ impl Case {
             exhaustive: false,
             map: false,
         };
-        let found = self.session.optimize_anchor(&search)?;
-        let best = self.session.optimize_anchor(&Search {
-            exhaustive: true,
-            ..search
-        })?;
+        let found = self
+            .session
+            .call(Cancellation::NEVER)
+            .optimize_anchor(&search)?;
+        let best = self
+            .session
+            .call(Cancellation::NEVER)
+            .optimize_anchor(&Search {
+                exhaustive: true,
+                ..search
+            })?;
         let apart = |d: usize| f64::from(found.cell[d]) - f64::from(best.cell[d]);
         Ok([
             found.loss,

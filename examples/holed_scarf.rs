@@ -2,10 +2,10 @@
 //!
 //! `cargo run --release --example holed_scarf -- [SEED] [INDEX] [OUT]`
 
-use darn::mesh::{Vec2, curvature::vertex_normals};
-use darn::scan::export::{Fresh, glb};
-use darn::scarffolds::scanned::{Hole, scanned};
-use darn::scarffolds::sheets;
+use darn_geometry::mesh::{Vec2, curvature::vertex_normals};
+use darn_gltf_scan::export::{Fresh, glb};
+use darn_lab::scarffolds::scanned::{Hole, scanned};
+use darn_lab::scarffolds::sheets;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let cut = scanned(&sheet, 62, &hole, &mut ChaCha8Rng::seed_from_u64(seed));
     // The simulation's up is +z, glTF's is +y.
-    let turn = |p: &darn::mesh::Vec3| [p.x as f32, p.z as f32, -p.y as f32];
+    let turn = |p: &darn_geometry::mesh::Vec3| [p.x as f32, p.z as f32, -p.y as f32];
     let positions: Vec<[f32; 3]> = cut.mesh.positions.iter().map(turn).collect();
     let normals: Vec<[f32; 3]> = vertex_normals(&cut.mesh).iter().map(turn).collect();
     let texcoords: Vec<[f32; 2]> = cut

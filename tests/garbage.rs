@@ -1,6 +1,6 @@
 //! Hostile and broken scans: never a panic, never memory beyond the limits, always an error that names the place.
 
-use darn::scan::{Limits, Scan, ScanError};
+use darn_gltf_scan::{Limits, Scan, ScanError};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 

@@ -3,12 +3,14 @@
 use super::failure::{Failure, OrFail};
 use super::files;
 use super::network::mender;
-use darn::contract::Constraints;
-use darn::grid::{CELLS, NormalGrid, SIDE};
-use darn::net::engine::{Engine, Gradient, Input, Isa, Options, Scratch};
-use darn::net::{BackendKind, NetError, Network, UnetConfig, weights};
-use darn::scan::{Limits, Scan};
-use darn::serve::NetworkArgs;
+use crate::settings::NetworkArgs;
+use darn_contract::Constraints;
+use darn_geometry::grid::{CELLS, NormalGrid, SIDE};
+use darn_gltf_scan::{Limits, Scan};
+#[cfg(feature = "burn")]
+use darn_lab::unet::{BackendKind, load_network};
+use darn_net::engine::{Engine, Gradient, Input, Isa, Options, Scratch};
+use darn_net::{Averaging, FillRequest, NetError, Network, UnetConfig, weights};
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -121,21 +123,11 @@ fn net(args: &NetArgs) -> Result<(), Failure> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(*threads);
         pools.push((*threads, pool.build().or_fail("start threads")?));
     }
-    let burn = if args.own {
+    let networks = if args.own {
         Vec::new()
     } else {
-        vec![
-            ("flex", BackendKind::Flex),
-            ("ndarray", BackendKind::Ndarray),
-        ]
+        burn_networks(&bytes)?
     };
-    let mut networks = Vec::new();
-    for (name, kind) in burn {
-        networks.push((
-            name,
-            Network::load(&bytes, kind).or_fail("load the weights")?,
-        ));
-    }
     let mut rows = Vec::new();
     for batch in &args.batch {
         for (threads, engine) in &engines {
@@ -160,6 +152,28 @@ fn net(args: &NetArgs) -> Result<(), Failure> {
     }
     print(&mut rows, &config, args.json);
     Ok(())
+}
+
+/// The network on burn's backends, by name.
+#[cfg(feature = "burn")]
+fn burn_networks(bytes: &[u8]) -> Result<Vec<(&'static str, Network)>, Failure> {
+    let load = |(name, kind)| {
+        let network = load_network(bytes, kind).or_fail("load the weights")?;
+        Ok((name, network))
+    };
+    [
+        ("flex", BackendKind::Flex),
+        ("ndarray", BackendKind::Ndarray),
+    ]
+    .map(load)
+    .into_iter()
+    .collect()
+}
+
+/// A build without burn has none of its backends.
+#[cfg(not(feature = "burn"))]
+fn burn_networks(_: &[u8]) -> Result<Vec<(&'static str, Network)>, Failure> {
+    Ok(Vec::new())
 }
 
 /// Waves with a square hole in the middle.
@@ -236,10 +250,18 @@ fn burns<'a>(
     threads: usize,
 ) -> [Row<'a>; 2] {
     let grids: Vec<NormalGrid> = (0..batch).map(grid).collect();
-    let forward = move || pool.install(|| network.fill(&grids)).map(drop);
+    let forward = move || {
+        let request = FillRequest {
+            grids: &grids,
+            up: None,
+            averaging: Averaging::Once,
+        };
+        pool.install(|| network.fill(&request)).map(drop)
+    };
     let (one, uvs) = (grid(0), vec![[0.5; 2]; batch]);
     let gradient = move || {
-        let found = pool.install(|| network.anchor_gradients(&one, [0.0; 3], &uvs));
+        let problem = network.anchor_problem(&one, [0.0; 3], None)?;
+        let found = pool.install(|| network.anchor_gradients(&problem, &uvs));
         found.map(drop)
     };
     let name = format!("burn {name}");
@@ -319,10 +341,11 @@ fn mend(args: &MendArgs) -> Result<(), Failure> {
         let started = Instant::now();
         let scan = Scan::read(&bytes, &Limits::default()).or_fail(format!("read {name}"))?;
         let read = started.elapsed();
-        let mended = darn::mend::mend(&scan, &Constraints::default(), &mender);
-        let mended = mended.or_fail(format!("mend {name}"))?.with_read_time(read);
+        let mended = darn_mend::mend(&scan, &Constraints::default(), &mender);
+        let mut mended = mended.or_fail(format!("mend {name}"))?;
+        darn_mend::add_read_time(&mut mended.report.timings, read);
         let scan = mended.report.timings.unwrap_or_default();
-        let sum = |of: fn(&darn::contract::v1::HoleTimings) -> f64| -> f64 {
+        let sum = |of: fn(&darn_contract::v1::HoleTimings) -> f64| -> f64 {
             let each = mended.report.holes.iter().flat_map(|hole| &hole.timings);
             each.map(of).sum()
         };

@@ -5,13 +5,13 @@ use super::files;
 use super::mended::mended;
 use super::network::mender;
 use super::progress::Progress;
-use darn::evaluate::{self, Cut, EvaluateError, Plan, Report, ScanRow, Scanner, Shares};
-use darn::grid::NormalGrid;
-use darn::net::Averaging;
-use darn::patch::Options;
-use darn::scarffolds::samples::{Sampler, Turning};
-use darn::scarffolds::sheets::{self, Sheet};
-use darn::serve::NetworkArgs;
+use crate::settings::NetworkArgs;
+use darn_geometry::grid::NormalGrid;
+use darn_geometry::patch::Options;
+use darn_lab::evaluate::{self, Cut, EvaluateError, Plan, Report, ScanRow, Scanner, Shares};
+use darn_lab::scarffolds::samples::{Sampler, Turning};
+use darn_lab::scarffolds::sheets::{self, Sheet};
+use darn_net::{Averaging, FillRequest};
 use image::ImageFormat;
 use serde_json::json;
 use std::io::Cursor;
@@ -70,11 +70,18 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mender = mender(&args.network)?;
     let network = mender.networks.default();
     let fill = |grids: &[NormalGrid]| {
-        let filled = match args.once {
-            true => network.fill(grids),
-            false => network.fill_averaged(grids, Averaging::Flips),
+        let averaging = match args.once {
+            true => Averaging::Once,
+            false => Averaging::Flips,
         };
-        filled.map_err(|error| EvaluateError::Filler(Box::new(error)))
+        let request = FillRequest {
+            grids,
+            up: None,
+            averaging,
+        };
+        network
+            .fill(&request)
+            .map_err(|error| EvaluateError::Filler(Box::new(error)))
     };
     let plan = Plan {
         noises: args.noises(),

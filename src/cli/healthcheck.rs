@@ -20,7 +20,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<(), Failure> {
-    darn::serve::healthcheck(args.listen, Duration::from_secs(args.patience))
+    darn_serve::healthcheck(args.listen, Duration::from_secs(args.patience))
         .or_fail("see the service ready")?;
     println!("{}: ready", args.listen);
     Ok(())

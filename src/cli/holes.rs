@@ -2,8 +2,8 @@
 
 use super::failure::{Failure, OrFail};
 use super::files;
-use darn::contract::v1::{HolesReport, Loop, LoopKind};
-use darn::scan::{Limits, Scan};
+use darn_contract::v1::{HolesReport, Loop, LoopKind};
+use darn_gltf_scan::{Limits, Scan};
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -19,8 +19,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let bytes = files::read(&args.scan)?;
     let name = args.scan.display();
     let scan = Scan::read(&bytes, &Limits::default()).or_fail(format!("read {name}"))?;
-    let report = darn::mend::find_holes(&scan, &darn::mend::Limits::default())
-        .or_fail(format!("find holes in {name}"))?;
+    let report = darn_mend::find_holes(&scan);
     if args.json {
         println!(
             "{}",

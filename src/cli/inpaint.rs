@@ -5,10 +5,10 @@ use super::files;
 use super::holes::kind;
 use super::network::mender;
 use super::progress::Progress;
-use darn::contract::v1::{HoleReport, Report};
-use darn::contract::{self, Constraints, FieldError};
-use darn::scan::{Limits, Scan};
-use darn::serve::NetworkArgs;
+use crate::settings::NetworkArgs;
+use darn_contract::v1::{HoleReport, Report};
+use darn_contract::{Constraints, FieldError};
+use darn_gltf_scan::{Limits, Scan};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -44,9 +44,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     progress.stage("loading weights");
     let mender = mender(&args.network)?;
     progress.stage("mending");
-    let mended = darn::mend::mend(&scan, &constraints, &mender)
-        .or_fail(format!("mend {name}"))?
-        .with_read_time(read);
+    let mut mended =
+        darn_mend::mend(&scan, &constraints, &mender).or_fail(format!("mend {name}"))?;
+    darn_mend::add_read_time(&mut mended.report.timings, read);
     progress.stage("writing");
     files::write(&args.output, &mended.bytes)?;
     if let Some(path) = &args.report {
@@ -63,8 +63,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 fn constraints(path: &Path) -> Result<Constraints, Failure> {
     let name = path.display();
     let text = files::read(path)?;
-    let message =
-        contract::from_json(&text).map_err(|error| Failure::Usage(format!("{name}: {error}")))?;
+    let message = darn_contract::from_json(&text)
+        .map_err(|error| Failure::Usage(format!("{name}: {error}")))?;
     Constraints::check(&message).map_err(|errors| {
         let all: Vec<String> = errors.iter().map(FieldError::to_string).collect();
         Failure::Usage(format!("{name}: {}", all.join("; ")))
@@ -122,7 +122,7 @@ fn kept(hole: &HoleReport) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use darn::contract::v1::Skipped;
+    use darn_contract::v1::Skipped;
 
     #[test]
     fn every_loop_has_its_line() {

@@ -1,23 +1,23 @@
 //! A scan-like mesh mended end to end, as a request would be: written as GLB, read, mended, read again.
 
-use darn::contract::Constraints;
-use darn::evaluate::EvaluateError;
-use darn::mend::{self, Mender};
-use darn::mesh::curvature::vertex_normals;
-use darn::mesh::{TriMesh, Vec3, weld};
-use darn::scan::export::{Fresh, glb};
-use darn::scan::{Limits, Scan};
-use darn::scarffolds::scanned::Scanned;
+use darn_contract::Constraints;
+use darn_geometry::mesh::curvature::vertex_normals;
+use darn_geometry::mesh::{TriMesh, Vec3, weld};
+use darn_gltf_scan::export::{Fresh, glb};
+use darn_gltf_scan::{Limits, Scan};
+use darn_lab::evaluate::EvaluateError;
+use darn_lab::scarffolds::scanned::Scanned;
+use darn_mend::NetworkMender;
 use std::error::Error;
 
 /// The mended mesh, welded.
-pub fn mended(scanned: &Scanned, mender: &Mender) -> Result<TriMesh, EvaluateError> {
+pub fn mended(scanned: &Scanned, mender: &NetworkMender) -> Result<TriMesh, EvaluateError> {
     through_glb(scanned, mender).map_err(EvaluateError::Mender)
 }
 
 fn through_glb(
     scanned: &Scanned,
-    mender: &Mender,
+    mender: &NetworkMender,
 ) -> Result<TriMesh, Box<dyn Error + Send + Sync>> {
     let triple = |p: &Vec3| [p.x as f32, p.y as f32, p.z as f32];
     let positions: Vec<[f32; 3]> = scanned.mesh.positions.iter().map(triple).collect();
@@ -36,7 +36,7 @@ fn through_glb(
         up: (architecture.frame.knows_up()).then_some([0.0, 0.0, 1.0]),
         ..Constraints::default()
     };
-    let mended = mend::mend(&scan, &constraints, mender)?;
+    let mended = darn_mend::mend(&scan, &constraints, mender)?;
     let scan = Scan::read(&mended.bytes, &Limits::default())?;
     Ok(weld::weld(&scan.surface).mesh)
 }

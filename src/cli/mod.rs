@@ -3,26 +3,31 @@
 //! No geometry, no HTTP routes, no training: a command that grows a second idea wants a room in the library.
 
 mod bench;
-mod bridge;
+#[cfg(feature = "burn")]
 mod evaluate;
 mod failure;
 mod files;
 mod healthcheck;
 mod holes;
 mod inpaint;
+#[cfg(feature = "burn")]
 mod mended;
 mod network;
 mod openapi;
 mod optimize_anchor;
 mod progress;
 mod render;
+#[cfg(feature = "burn")]
 mod samples;
+#[cfg(feature = "burn")]
 mod scarffolds;
 mod serve;
+#[cfg(feature = "burn")]
 mod train;
 
+use crate::settings::ServeCommand;
 use clap::{Parser, Subcommand};
-use darn::serve::{LogFormat, ServeArgs, start_logging};
+use darn_serve::{LogFormat, start_logging};
 use failure::Failure;
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -41,7 +46,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Serve HTTP: POST a scan to /inpaint, get it back mended
-    Serve(ServeArgs),
+    Serve(ServeCommand),
     /// Fill the holes of a scan
     Inpaint(inpaint::Args),
     /// Search where on a hole's chart a point in space belongs
@@ -53,12 +58,16 @@ enum Command {
     /// Ask a running service whether it is ready: exit 0 if so, 1 if not
     Healthcheck(healthcheck::Args),
     /// Simulate sheets of cloth to train on
+    #[cfg(feature = "burn")]
     Scarffolds(scarffolds::Args),
     /// Write samples to learn from to standard output, for a trainer outside this program
+    #[cfg(feature = "burn")]
     Samples(samples::Args),
     /// Train a network on simulated sheets
+    #[cfg(feature = "burn")]
     Train(train::Args),
     /// Measure a network's fills on held-out sheets
+    #[cfg(feature = "burn")]
     Evaluate(evaluate::Args),
     /// Measure how long the network and a mend take here
     Bench(bench::Args),
@@ -100,9 +109,13 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Holes(args) => holes::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Healthcheck(args) => healthcheck::run(&args),
+        #[cfg(feature = "burn")]
         Command::Scarffolds(args) => scarffolds::run(&args),
+        #[cfg(feature = "burn")]
         Command::Samples(args) => samples::run(&args),
+        #[cfg(feature = "burn")]
         Command::Train(args) => train::run(&args),
+        #[cfg(feature = "burn")]
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Bench(args) => bench::run(&args),
         Command::Openapi => openapi::run(),

@@ -2,9 +2,12 @@
 
 use super::failure::{Failure, OrFail};
 use super::files;
-use darn::mend::{Limits, Mender};
-use darn::net::{BackendKind, Network, Networks, Settings};
-use darn::serve::{Autodiff, Backend, NetworkArgs};
+use crate::settings::{Autodiff, Backend, NetworkArgs};
+#[cfg(feature = "burn")]
+use darn_lab::unet::{BackendKind, Settings, load_network};
+use darn_mend::NetworkMender;
+use darn_net::engine::Options;
+use darn_net::{NetError, Network, Networks};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -34,10 +37,8 @@ pub fn standard() -> &'static [u8] {
 /// Loads the networks that were asked for, or the shipped ones.
 ///
 /// Of a directory, all files whose name ends in `.safetensors`: `standard.safetensors`, which must be there, is the default.
-pub fn mender(args: &NetworkArgs) -> Result<Mender, Failure> {
-    let settings = settings(args.backend, args.autodiff)?;
-    let load =
-        |bytes: &[u8], name: &str| Network::load(bytes, settings).or_fail(format!("load {name}"));
+pub fn mender(args: &NetworkArgs) -> Result<NetworkMender, Failure> {
+    let load = |bytes: &[u8], name: &str| loaded(bytes, args).or_fail(format!("load {name}"));
     let networks: Result<Vec<Network>, Failure> = match &args.weights {
         None => (SHIPPED.par_iter())
             .map(|(name, bytes)| load(bytes, &format!("the shipped {name}")))
@@ -51,10 +52,8 @@ pub fn mender(args: &NetworkArgs) -> Result<Mender, Failure> {
     let default = networks
         .next()
         .ok_or_else(|| Failure::Usage("there are no weights".into()))?;
-    Ok(Mender {
-        networks: Networks::new(default, networks.collect()),
-        limits: Limits::default(),
-    })
+    let networks = Networks::new(default, networks.collect());
+    Ok(NetworkMender::new(networks))
 }
 
 /// The weights in a directory, the default ones first, the others by name.
@@ -74,28 +73,43 @@ fn in_directory(path: &Path) -> Result<Vec<PathBuf>, Failure> {
     Ok(others)
 }
 
-/// What runs and what differentiates.
-fn settings(backend: Backend, autodiff: Autodiff) -> Result<Settings, Failure> {
-    let name = match backend {
-        Backend::Engine => "engine",
-        Backend::Flex => "flex",
-        Backend::Ndarray => "ndarray",
+/// Copies of a grid, and places of a search, are divided among all threads; a single grid's layers, too.
+fn options() -> Options {
+    Options {
+        isa: None,
+        threads: rayon::current_num_threads(),
+    }
+}
+
+/// A network that computes as the settings say.
+#[cfg(feature = "burn")]
+fn loaded(bytes: &[u8], args: &NetworkArgs) -> Result<Network, NetError> {
+    let backend = match args.backend {
+        Backend::Engine => BackendKind::Engine,
+        Backend::Flex => BackendKind::Flex,
+        Backend::Ndarray => BackendKind::Ndarray,
     };
-    // A build without a backend does not know its name.
-    let backend: BackendKind = name
-        .parse()
-        .map_err(|error: darn::net::NetError| Failure::Usage(error.to_string()))?;
-    let autodiff = match (autodiff, backend) {
+    let autodiff = match (args.autodiff, backend) {
         (Autodiff::Burn, BackendKind::Engine) => Some(BackendKind::Flex),
         _ => None,
     };
-    // Copies of a grid, and places of a search, are shared out to all threads; a single grid's layers, too.
-    let threads = rayon::current_num_threads();
-    Ok(Settings {
+    let settings = Settings {
         backend,
         autodiff,
-        engine: darn::net::engine::Options { isa: None, threads },
-    })
+        engine: options(),
+    };
+    load_network(bytes, settings)
+}
+
+/// A network on darn's own engine: a build without burn has no other.
+#[cfg(not(feature = "burn"))]
+fn loaded(bytes: &[u8], args: &NetworkArgs) -> Result<Network, NetError> {
+    let NetworkArgs {
+        backend: Backend::Engine,
+        autodiff: Autodiff::Engine,
+        ..
+    } = args;
+    Network::load(bytes, options())
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::failure::{Failure, OrFail};
 use std::io::Write;
 
 pub fn run() -> Result<(), Failure> {
-    let mut text = serde_json::to_string_pretty(&darn::serve::openapi::document())
+    let mut text = serde_json::to_string_pretty(&darn_serve::openapi::document())
         .or_fail("write the document")?;
     text.push('\n');
     // Not print!, which panics when the reader, say `head`, has gone.

@@ -4,9 +4,9 @@ use super::failure::{Failure, OrFail};
 use super::files;
 use super::network::mender;
 use super::progress::Progress;
-use darn::contract::Search;
-use darn::scan::{Limits, Scan};
-use darn::serve::NetworkArgs;
+use crate::settings::NetworkArgs;
+use darn_contract::Search;
+use darn_gltf_scan::{Limits, Scan};
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -52,15 +52,15 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         map: args.map.is_some(),
     };
     let mut found =
-        darn::mend::optimize_anchor(&scan, &search, &mender).or_fail(format!("search {name}"))?;
+        darn_mend::optimize_anchor(&scan, &search, &mender).or_fail(format!("search {name}"))?;
     if let Some(path) = &args.map {
         // The picture is in its file; in the JSON it would only be base64.
         files::write(path, &std::mem::take(&mut found.map_png))?;
     }
     if let Some(path) = &args.mend {
         progress.stage("mending");
-        let anchor = darn::mend::anchor_of(&found, &search);
-        let mended = darn::mend::mend(&scan, &anchor, &mender).or_fail(format!("mend {name}"))?;
+        let anchor = darn_mend::anchor_of(&found, &search);
+        let mended = darn_mend::mend(&scan, &anchor, &mender).or_fail(format!("mend {name}"))?;
         files::write(path, &mended.bytes)?;
     }
     drop(progress);

@@ -2,9 +2,9 @@
 
 use super::failure::{Failure, OrFail};
 use super::files;
-use darn::mesh::{Vec3, weld};
-use darn::render::{Aim, CLOTH, Framing, Lines, MAX_SIDE, MENDED, View, picture};
-use darn::scan::{Limits, Scan};
+use darn_geometry::mesh::{Vec3, weld};
+use darn_gltf_scan::{Limits, Scan};
+use darn_render::{Aim, CLOTH, Framing, Lines, MAX_SIDE, MENDED, View, picture};
 use image::ImageFormat;
 use std::io::Cursor;
 use std::path::PathBuf;

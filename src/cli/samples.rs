@@ -1,10 +1,10 @@
 //! `darn samples`: what a trainer outside this program learns from, as records on standard output.
 
 use super::failure::{Failure, OrFail};
-use darn::net::{FrameKind, UnetConfig};
-use darn::scarffolds::samples::Turning;
-use darn::train::batch::{Prepared, Recipe, prepare};
-use darn::train::{self, record};
+use darn_lab::scarffolds::samples::Turning;
+use darn_lab::train::batch::{Prepared, Recipe, prepare};
+use darn_lab::train::{self, record};
+use darn_net::{FrameKind, UnetConfig};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::io::{ErrorKind, IsTerminal, Write};

@@ -3,8 +3,8 @@
 use super::failure::{Failure, OrFail};
 use super::files;
 use super::progress::Progress;
-use darn::scarffolds::export::{as_glb, contact_sheet};
-use darn::scarffolds::sheets::{self, Sheet};
+use darn_lab::scarffolds::export::{as_glb, contact_sheet};
+use darn_lab::scarffolds::sheets::{self, Sheet};
 use image::ImageFormat;
 use rand::SeedableRng;
 use rand::seq::index::sample;

@@ -1,33 +1,25 @@
 //! `darn serve`: the service.
 
-use super::bridge::Bridge;
 use super::failure::{Failure, OrFail};
 use super::network;
-use darn::scan::Limits;
-use darn::serve::{ServeArgs, start_logging};
+use crate::settings::ServeCommand;
+use darn_mend::{NetworkMender, SharedMender};
+use darn_serve::start_logging;
 use std::sync::Arc;
 
-pub fn run(settings: &ServeArgs) -> Result<(), Failure> {
-    start_logging(&settings.log, settings.log_format)
-        .map_err(|error| Failure::Usage(format!("--log {}: {error}", settings.log)))?;
+pub fn run(settings: &ServeCommand) -> Result<(), Failure> {
+    let serve = &settings.serve;
+    start_logging(&serve.log, serve.log_format)
+        .map_err(|error| Failure::Usage(format!("--log {}: {error}", serve.log)))?;
     if let Some(threads) = settings.threads {
         (rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build_global())
         .or_fail("start threads")?;
     }
-    let mender = network::mender(&settings.network)?;
-    let limits = Limits {
-        max_faces: settings.max_faces,
-        max_vertices: settings.max_vertices,
-        ..Limits::default()
+    let mender = NetworkMender {
+        scan_limits: settings.scan_limits(),
+        ..network::mender(&settings.network)?
     };
-    darn::serve::run(
-        settings,
-        Arc::new(Bridge {
-            mender: Arc::new(mender),
-            limits,
-        }),
-    )
-    .or_fail("serve")
+    darn_serve::run(serve, Arc::new(SharedMender(Arc::new(mender)))).or_fail("serve")
 }

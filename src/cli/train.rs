@@ -1,8 +1,8 @@
 //! `darn train`: train a network on simulated sheets.
 
 use super::failure::{Failure, OrFail};
-use darn::net::{FrameKind, InputKind, UnetConfig};
-use darn::train::{LossWeights, Progress, Score, Start, TrainOptions, Trainer};
+use darn_lab::train::{LossWeights, Progress, Score, Start, TrainOptions, Trainer};
+use darn_net::{FrameKind, InputKind, UnetConfig};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -173,8 +173,8 @@ impl Loss {
 
 pub fn run(args: &Args) -> Result<(), Failure> {
     let mut told = Told::new();
-    let summary =
-        darn::train::run(&args.options(), &mut |progress| told.step(progress)).or_fail("train")?;
+    let summary = darn_lab::train::run(&args.options(), &mut |progress| told.step(progress))
+        .or_fail("train")?;
     drop(told);
     println!(
         "{} steps in {:.1} minutes; weights in {}",

@@ -2,18 +2,20 @@
 
 use std::sync::{Arc, OnceLock};
 
-use darn::contract::Constraints;
-use darn::mend::{Limits, MendError, Mended, Mender, mend};
-use darn::mesh::curvature::{face_areas, vertex_normals};
-use darn::mesh::loops::{BoundaryLoop, boundary_loops};
-use darn::mesh::topology::Topology;
-use darn::mesh::weld::{Welded, weld};
-use darn::mesh::{TriMesh, Vec2, Vec3};
-use darn::net::{BackendKind, Network, Networks};
-use darn::scan::export::{Fresh, glb};
-use darn::scan::{self, Scan};
-use darn::scarffolds::scanned::{Hole, Scanned, scanned};
-use darn::scarffolds::sheets::{self, Sheet};
+use darn_contract::Constraints;
+use darn_contract::port::Mended;
+use darn_geometry::mesh::curvature::{face_areas, vertex_normals};
+use darn_geometry::mesh::loops::{BoundaryLoop, boundary_loops};
+use darn_geometry::mesh::topology::Topology;
+use darn_geometry::mesh::weld::{Welded, weld};
+use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
+use darn_gltf_scan::Scan;
+use darn_gltf_scan::export::{Fresh, glb};
+use darn_lab::scarffolds::scanned::{Hole, Scanned, scanned};
+use darn_lab::scarffolds::sheets::{self, Sheet};
+use darn_mend::{MendError, NetworkMender, mend};
+use darn_net::engine::Options;
+use darn_net::{Network, Networks};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -28,17 +30,17 @@ pub const ROUND: Hole = Hole::Circle {
 
 /// A network that ships.
 pub fn network(weights: &[u8]) -> Network {
-    Network::load(weights, BackendKind::default()).expect("the shipped weights load")
+    Network::load(weights, Options::default()).expect("the shipped weights load")
 }
 
 /// The mender, loaded once for all tests.
-pub fn mender() -> &'static Arc<Mender> {
-    static MENDER: OnceLock<Arc<Mender>> = OnceLock::new();
+pub fn mender() -> &'static Arc<NetworkMender> {
+    static MENDER: OnceLock<Arc<NetworkMender>> = OnceLock::new();
     MENDER.get_or_init(|| {
-        Arc::new(Mender {
-            networks: Networks::new(network(WEIGHTS), Vec::new()),
-            limits: Limits::default(),
-        })
+        Arc::new(NetworkMender::new(Networks::new(
+            network(WEIGHTS),
+            Vec::new(),
+        )))
     })
 }
 
@@ -78,7 +80,7 @@ pub fn packed(mesh: &TriMesh, texcoords: &[[f32; 2]]) -> Vec<u8> {
 }
 
 pub fn read(bytes: &[u8]) -> Scan {
-    Scan::read(bytes, &scan::Limits::default()).expect("a readable scan")
+    Scan::read(bytes, &darn_gltf_scan::Limits::default()).expect("a readable scan")
 }
 
 pub fn mended(bytes: &[u8], constraints: &Constraints) -> Result<Mended, MendError> {

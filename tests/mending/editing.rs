@@ -2,16 +2,17 @@
 
 use std::sync::Arc;
 
-use darn::contract::{Anchor, Constraints, Edit, Gesture, Search};
-use darn::mend::{self, Session};
-use darn::mesh::{Vec2, Vec3};
-use darn::scarffolds::sheets::Sheet;
+use darn_contract::port::Cancellation;
+use darn_contract::{Anchor, Constraints, Edit, Gesture, Search};
+use darn_geometry::mesh::{Vec2, Vec3};
+use darn_lab::scarffolds::sheets::Sheet;
+use darn_mend::ScanSession;
 
 use super::cloth::{ROUND, holed, laid, mended, mender, packed, read, sheet};
 
 /// A session on a sheet with a round hole, and its cloth as it is without constraints.
 struct Edited {
-    session: Session,
+    session: ScanSession,
     positions: Vec<Vec3>,
     uvs: Vec<Vec2>,
     rim: usize,
@@ -24,10 +25,19 @@ struct Edited {
 impl Edited {
     fn of(sheet: &Sheet) -> Edited {
         let scan = read(&packed(&holed(sheet, &ROUND).mesh, &[]));
-        let session = Session::open(scan, &Constraints::default(), Arc::clone(mender())).unwrap();
+        let session = ScanSession::open(
+            scan,
+            &Constraints::default(),
+            Arc::clone(mender()),
+            Cancellation::NEVER,
+        )
+        .unwrap();
         let described = session.described();
         let hole = &described.holes[0];
-        let (mut positions, report) = session.positions(&Constraints::default()).unwrap();
+        let (mut positions, report) = session
+            .call(Cancellation::NEVER)
+            .positions(&Constraints::default())
+            .unwrap();
         let grid = report.holes[0].grid.unwrap();
         let rim: Vec<&[f64]> = hole.rim_uvs.chunks_exact(2).collect();
         let across = |d: usize| {
@@ -117,6 +127,7 @@ fn anchors_on_the_unedited_cloth_change_next_to_nothing() {
         let anchors = places.map(|at| cloth.anchor(cloth.vertex(at), Vec3::zeros()));
         let (positions, report) = cloth
             .session
+            .call(Cancellation::NEVER)
             .positions(&anchored(anchors.to_vec()))
             .unwrap();
         let off = rms(&positions[0], &cloth.positions) / cloth.cell;
@@ -137,7 +148,11 @@ fn an_anchor_two_cells_off_is_met() {
         let vertex = cloth.vertex([0.1, -0.1]);
         let by = cloth.across(vertex) * 2.0 * cloth.cell;
         let asked = anchored(vec![cloth.anchor(vertex, by)]);
-        let (positions, report) = cloth.session.positions(&asked).unwrap();
+        let (positions, report) = cloth
+            .session
+            .call(Cancellation::NEVER)
+            .positions(&asked)
+            .unwrap();
         let told = &report.holes[0].anchors[0];
         let off = (positions[0][vertex] - cloth.positions[vertex] - by).norm();
         assert!((off - told.distance).abs() < 1e-6 * cloth.cell);
@@ -157,10 +172,18 @@ fn an_absurd_anchor_neither_tears_nor_explodes() {
         let vertex = cloth.vertex([0.0, 0.0]);
         let by = cloth.across(vertex) * 10.0 * cloth.extent;
         let asked = anchored(vec![cloth.anchor(vertex, by)]);
-        let (positions, report) = cloth.session.positions(&asked).unwrap();
+        let (positions, report) = cloth
+            .session
+            .call(Cancellation::NEVER)
+            .positions(&asked)
+            .unwrap();
         let hole = &report.holes[0];
         let stretch = hole.patch.as_ref().unwrap().stretch_max;
-        let (_, free) = cloth.session.positions(&Constraints::default()).unwrap();
+        let (_, free) = cloth
+            .session
+            .call(Cancellation::NEVER)
+            .positions(&Constraints::default())
+            .unwrap();
         let usual = free.holes[0].patch.as_ref().unwrap().stretch_max;
         assert!(
             stretch <= 1.25f64.max(1.05 * usual) + 1e-6,
@@ -186,13 +209,21 @@ fn a_hard_anchor_is_met_or_refused_with_the_numbers() {
     };
     let far = hard(cloth.across(vertex) * 10.0 * cloth.extent);
     let soft = cloth.anchor(vertex, Vec3::zeros());
-    let error = (cloth.session.positions(&anchored(vec![soft, far]))).unwrap_err();
+    let error = (cloth
+        .session
+        .call(Cancellation::NEVER)
+        .positions(&anchored(vec![soft, far])))
+    .unwrap_err();
     assert_eq!(error.code(), "anchor_out_of_reach");
     assert_eq!(error.fields()[0].pointer, "/anchors/1");
     assert!(error.fields()[0].detail.contains("beyond"), "{error}");
 
     let near = hard(cloth.across(vertex) * 0.5 * cloth.cell);
-    let (_, report) = cloth.session.positions(&anchored(vec![near])).unwrap();
+    let (_, report) = cloth
+        .session
+        .call(Cancellation::NEVER)
+        .positions(&anchored(vec![near]))
+        .unwrap();
     assert!(report.holes[0].anchors[0].distance <= 1e-3 * cloth.extent);
 }
 
@@ -223,7 +254,11 @@ fn a_soft_anchor_at_the_rim_gives_way_to_a_hard_one() {
             position: (at + cloth.across(middle) * 0.5 * cloth.cell).into(),
             hard: false,
         };
-        let (_, report) = (cloth.session.positions(&anchored(vec![hard, soft]))).unwrap();
+        let (_, report) = (cloth
+            .session
+            .call(Cancellation::NEVER)
+            .positions(&anchored(vec![hard, soft])))
+        .unwrap();
         assert!(report.holes[0].anchors[0].distance <= 1e-3 * cloth.extent);
     }
 }
@@ -237,8 +272,13 @@ fn gestures_compose_in_order() {
         uv,
         offset: (up * share).into(),
     };
-    let (once, report) = cloth.session.positions(&edited(&[grab(1.5)])).unwrap();
+    let (once, report) = cloth
+        .session
+        .call(Cancellation::NEVER)
+        .positions(&edited(&[grab(1.5)]))
+        .unwrap();
     let (twice, _) = (cloth.session)
+        .call(Cancellation::NEVER)
         .positions(&edited(&[grab(1.0), grab(0.5)]))
         .unwrap();
     assert!(rms(&once[0], &twice[0]) < 1e-6 * cloth.cell);
@@ -252,7 +292,11 @@ fn gestures_compose_in_order() {
         angle,
     };
     let asked = edited(&[twist(0.5), twist(-0.5)]);
-    let (back, report) = cloth.session.positions(&asked).unwrap();
+    let (back, report) = cloth
+        .session
+        .call(Cancellation::NEVER)
+        .positions(&asked)
+        .unwrap();
     let off = rms(&back[0], &cloth.positions) / cloth.cell;
     assert!(off < 0.25, "there and back again: {off} cells");
     assert!(report.holes[0].edits[0].anchors > 5);
@@ -281,13 +325,21 @@ fn the_search_finds_what_trying_every_cell_finds() {
         exhaustive: false,
         map: false,
     };
-    let found = cloth.session.optimize_anchor(&search).unwrap();
+    let found = cloth
+        .session
+        .call(Cancellation::NEVER)
+        .optimize_anchor(&search)
+        .unwrap();
     let all = Search {
         exhaustive: true,
         map: true,
         ..search
     };
-    let best = cloth.session.optimize_anchor(&all).unwrap();
+    let best = cloth
+        .session
+        .call(Cancellation::NEVER)
+        .optimize_anchor(&all)
+        .unwrap();
     let apart = |d: usize| f64::from(found.cell[d]) - f64::from(best.cell[d]);
     assert!(
         apart(0).hypot(apart(1)) <= 2.0 || found.loss <= 1.1 * best.loss,
@@ -307,7 +359,11 @@ fn the_search_finds_what_trying_every_cell_finds() {
         uv: None,
         ..cloth.anchor(vertex, target - cloth.positions[vertex])
     }]);
-    let (_, report) = cloth.session.positions(&asked).unwrap();
+    let (_, report) = cloth
+        .session
+        .call(Cancellation::NEVER)
+        .positions(&asked)
+        .unwrap();
     assert_eq!(report.holes[0].anchors[0].uv, found.uv);
 }
 
@@ -321,7 +377,11 @@ fn a_target_out_of_this_world_is_searched_for_all_the_same() {
         exhaustive: false,
         map: false,
     };
-    let found = cloth.session.optimize_anchor(&search).unwrap();
+    let found = cloth
+        .session
+        .call(Cancellation::NEVER)
+        .optimize_anchor(&search)
+        .unwrap();
     assert!(found.loss.is_finite() && found.distance > 9e16);
     let asked = anchored(vec![Anchor {
         hole: None,
@@ -329,7 +389,11 @@ fn a_target_out_of_this_world_is_searched_for_all_the_same() {
         position: search.target,
         hard: false,
     }]);
-    let (positions, _) = cloth.session.positions(&asked).unwrap();
+    let (positions, _) = cloth
+        .session
+        .call(Cancellation::NEVER)
+        .positions(&asked)
+        .unwrap();
     assert!(positions[0].iter().all(|p| p.norm() < 1e3));
 }
 
@@ -337,8 +401,13 @@ fn a_target_out_of_this_world_is_searched_for_all_the_same() {
 fn a_session_answers_as_single_calls_do() {
     let sheet = laid(|u, v| [u, 0.03 * (9.0 * u).sin(), -v]);
     let bytes = packed(&holed(&sheet, &ROUND).mesh, &[]);
-    let session =
-        Session::open(read(&bytes), &Constraints::default(), Arc::clone(mender())).unwrap();
+    let session = ScanSession::open(
+        read(&bytes),
+        &Constraints::default(),
+        Arc::clone(mender()),
+        Cancellation::NEVER,
+    )
+    .unwrap();
     let cloth = Edited::of(&sheet);
     let asked = Constraints {
         anchors: vec![cloth.anchor(cloth.vertex([0.2, 0.0]), Vec3::y() * cloth.cell)],
@@ -352,15 +421,18 @@ fn a_session_answers_as_single_calls_do() {
         asked.clone(),
         Constraints::default(),
     ] {
-        let kept = session.mended(&constraints).unwrap();
+        let kept = session
+            .call(Cancellation::NEVER)
+            .mended(&constraints)
+            .unwrap();
         let single = mended(&bytes, &constraints).unwrap();
         assert!(kept.bytes == single.bytes);
         assert_eq!(kept.report.holes[0].patch, single.report.holes[0].patch);
     }
 
     // The patches alone are the same vertices.
-    let (glb, _) = session.glb(&asked).unwrap();
-    let (positions, _) = session.positions(&asked).unwrap();
+    let (glb, _) = session.call(Cancellation::NEVER).glb(&asked).unwrap();
+    let (positions, _) = session.call(Cancellation::NEVER).positions(&asked).unwrap();
     let alone = read(&glb);
     assert_eq!(alone.surface.positions.len(), positions[0].len());
     assert_eq!(
@@ -375,13 +447,16 @@ fn a_session_answers_as_single_calls_do() {
         exhaustive: false,
         map: false,
     };
-    let kept = session.optimize_anchor(&search).unwrap();
-    let single = mend::optimize_anchor(&read(&bytes), &search, mender()).unwrap();
+    let kept = session
+        .call(Cancellation::NEVER)
+        .optimize_anchor(&search)
+        .unwrap();
+    let single = darn_mend::optimize_anchor(&read(&bytes), &search, mender()).unwrap();
     assert_eq!((&kept.path, kept.loss), (&single.path, single.loss));
-    let to_target = mend::mend_to_target(&read(&bytes), &search, mender()).unwrap();
+    let to_target = darn_mend::mend_to_target(&read(&bytes), &search, mender()).unwrap();
     assert!(
         to_target.bytes
-            == mended(&bytes, &mend::anchor_of(&kept, &search))
+            == mended(&bytes, &darn_mend::anchor_of(&kept, &search))
                 .unwrap()
                 .bytes
     );
@@ -401,7 +476,13 @@ fn a_session_says_what_it_keeps() {
     assert_eq!(described.skipped.len(), 1);
     let anchor = cloth.anchor(cloth.vertex([0.0, 0.0]), Vec3::zeros());
     let scan = read(&packed(&holed(sheet(0), &ROUND).mesh, &[]));
-    let error = Session::open(scan, &anchored(vec![anchor]), Arc::clone(mender())).err();
+    let error = ScanSession::open(
+        scan,
+        &anchored(vec![anchor]),
+        Arc::clone(mender()),
+        Cancellation::NEVER,
+    )
+    .err();
     assert_eq!(error.unwrap().fields()[0].pointer, "/anchors");
 }
 

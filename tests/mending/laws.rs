@@ -1,11 +1,11 @@
 //! What must hold of every mended scan.
 
-use darn::contract::Constraints;
-use darn::mend::{Limits, Mender, mend};
-use darn::mesh::loops::LoopKind;
-use darn::mesh::{TriMesh, Vec2, Vec3};
-use darn::net::Networks;
-use darn::scarffolds::scanned::Hole;
+use darn_contract::Constraints;
+use darn_geometry::mesh::loops::LoopKind;
+use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
+use darn_lab::scarffolds::scanned::Hole;
+use darn_mend::{NetworkMender, mend};
+use darn_net::Networks;
 use nalgebra::Rotation3;
 
 use super::cloth::{ROUND, Seen, WEIGHTS, area, holed, laid, mended, network, packed, read, sheet};
@@ -101,10 +101,7 @@ fn the_same_scan_gives_the_same_bytes() {
 #[test]
 fn cloth_told_where_up_is_turns_with_it() {
     let gravity = network(include_bytes!("../../weights/gravity.safetensors"));
-    let mender = Mender {
-        networks: Networks::new(network(WEIGHTS), vec![gravity]),
-        limits: Limits::default(),
-    };
+    let mender = NetworkMender::new(Networks::new(network(WEIGHTS), vec![gravity]));
     let hanging = holed(sheet(1), &ROUND).mesh;
     let invented = |turn: Rotation3<f64>, up: Vec3| {
         let mesh = TriMesh {

@@ -2,12 +2,13 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use darn::contract::{Anchor, Constraints, Edit, Gesture, HoleSelector};
-use darn::mend::{Call, Limits, MendError, Mender, mend};
-use darn::mesh::intersect::intersections_with;
-use darn::mesh::{TriMesh, Vec2, Vec3};
-use darn::net::Networks;
-use darn::scarffolds::scanned::Hole;
+use darn_contract::port::Cancellation;
+use darn_contract::{Anchor, Constraints, Edit, Gesture, HoleSelector};
+use darn_geometry::mesh::intersect::intersections_with;
+use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
+use darn_lab::scarffolds::scanned::Hole;
+use darn_mend::{Call, Limits, MendError, NetworkMender, mend};
+use darn_net::Networks;
 
 use super::cloth::{
     ROUND, Seen, WEIGHTS, holed, laid, mended, mender, network, packed, read, sheet,
@@ -91,7 +92,7 @@ fn the_outer_boundary_is_never_filled() {
 #[test]
 fn a_scan_without_holes_is_refused_and_its_loops_are_named() {
     let none = Hole::Circle {
-        centre: darn::mesh::Vec2::new(0.5, 0.5),
+        centre: darn_geometry::mesh::Vec2::new(0.5, 0.5),
         radius: 0.0,
     };
     let bytes = packed(&holed(sheet(0), &none).mesh, &[]);
@@ -223,12 +224,12 @@ fn cloth_with_a_triangle_for_either_side_gets_a_patch_with_both() {
 
 #[test]
 fn more_holes_than_are_filled_at_once_are_refused() {
-    let mender = Mender {
-        networks: Networks::new(network(WEIGHTS), Vec::new()),
+    let mender = NetworkMender {
         limits: Limits {
             holes: 1,
             ..Limits::default()
         },
+        ..NetworkMender::new(Networks::new(network(WEIGHTS), Vec::new()))
     };
     let scan = read(&pair());
     let error = mend(&scan, &Constraints::default(), &mender).unwrap_err();
@@ -240,10 +241,11 @@ fn more_holes_than_are_filled_at_once_are_refused() {
 fn what_nobody_waits_for_is_given_up() {
     let scan = read(&pair());
     let asked = AtomicUsize::new(0);
+    // Gone when the second hole has been prepared.
+    let gone = || asked.fetch_add(1, Ordering::Relaxed) >= 2;
     let call = Call {
         mender: mender(),
-        // Gone when the second hole has been prepared.
-        wanted: &|| asked.fetch_add(1, Ordering::Relaxed) < 2,
+        cancellation: Cancellation::new(&gone),
     };
     let error = mend(&scan, &Constraints::default(), call).unwrap_err();
     assert!(matches!(error, MendError::Abandoned), "{error}");

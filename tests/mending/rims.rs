@@ -2,9 +2,9 @@
 
 use std::collections::HashSet;
 
-use darn::contract::Constraints;
-use darn::mesh::loops::LoopKind;
-use darn::mesh::{TriMesh, Vec3};
+use darn_contract::Constraints;
+use darn_geometry::mesh::loops::LoopKind;
+use darn_geometry::mesh::{TriMesh, Vec3};
 
 use super::cloth::{Seen, mended, packed};
 

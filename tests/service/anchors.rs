@@ -1,6 +1,6 @@
 //! The anchor search at both doors.
 
-use darn::contract::v1::{AnchorQuery, Constraints, ScanChunk, darn_client::DarnClient};
+use darn_contract::v1::{AnchorQuery, Constraints, ScanChunk, darn_client::DarnClient};
 use reqwest::{
     RequestBuilder,
     multipart::{Form, Part},

@@ -1,6 +1,6 @@
 //! What goes right: both doors give the same answers.
 
-use darn::contract::v1::{
+use darn_contract::v1::{
     Anchor, Constraints, ScanChunk, darn_client::DarnClient, inpaint_chunk::Part as ChunkPart,
 };
 use reqwest::multipart::{Form, Part};
@@ -214,7 +214,7 @@ async fn a_health_check_asks_for_readiness() {
     let service = Service::start(&[]).await;
     let ask = |address| {
         let patience = std::time::Duration::from_secs(5);
-        tokio::task::spawn_blocking(move || darn::serve::healthcheck(address, patience))
+        tokio::task::spawn_blocking(move || darn_serve::healthcheck(address, patience))
     };
     ask(service.address).await.unwrap().unwrap();
     service.stop.cancel();

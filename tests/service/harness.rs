@@ -10,13 +10,11 @@ use std::{
 };
 
 use clap::Parser;
-use darn::{
-    contract::{Anchor, Constraints, FieldError, Search, v1},
-    serve::{
-        App, Class, Kept, Mended, Menders, PatchForm, Patches, Refusal, ServeArgs, ServeError,
-        Sockets, Wanted, serve,
-    },
+use darn_contract::port::{
+    Cancellation, Class, EditSession, Mended, Mender, PatchForm, Patches, Refusal,
 };
+use darn_contract::{Anchor, Constraints, FieldError, Search, v1};
+use darn_serve::{App, ServeArgs, ServeError, Sockets, serve};
 use reqwest::{Body, Method, RequestBuilder, Response, StatusCode};
 use serde_json::Value;
 use tokio::task::JoinHandle;
@@ -208,7 +206,7 @@ impl Drop for FakeKept {
     }
 }
 
-impl Kept for FakeKept {
+impl EditSession for FakeKept {
     fn described(&self) -> v1::Session {
         v1::Session {
             holes: vec![v1::SessionHole {
@@ -230,7 +228,7 @@ impl Kept for FakeKept {
         &self,
         constraints: &Constraints,
         form: PatchForm,
-        _: Wanted<'_>,
+        _: Cancellation<'_>,
     ) -> Result<Patches, Refusal> {
         self.act(constraints)?;
         let positions = constraints.anchors.iter().flat_map(|a| a.position);
@@ -244,7 +242,7 @@ impl Kept for FakeKept {
         })
     }
 
-    fn mended(&self, constraints: &Constraints, _: Wanted<'_>) -> Result<Mended, Refusal> {
+    fn mended(&self, constraints: &Constraints, _: Cancellation<'_>) -> Result<Mended, Refusal> {
         let xs: Vec<f64> = constraints.anchors.iter().map(|a| a.position[0]).collect();
         Ok(Mended {
             bytes: format!("glTF {} {xs:?}", self.scan).into_bytes(),
@@ -252,17 +250,21 @@ impl Kept for FakeKept {
         })
     }
 
-    fn optimize_anchor(&self, search: &Search, _: Wanted<'_>) -> Result<v1::AnchorFound, Refusal> {
+    fn optimize_anchor(
+        &self,
+        search: &Search,
+        _: Cancellation<'_>,
+    ) -> Result<v1::AnchorFound, Refusal> {
         Ok(found(search))
     }
 }
 
-impl Menders for Fake {
+impl Mender for Fake {
     fn inpaint(
         &self,
         scan: &[u8],
         constraints: &Constraints,
-        _: Wanted<'_>,
+        _: Cancellation<'_>,
     ) -> Result<Mended, Refusal> {
         self.act(scan)?;
         Ok(Mended {
@@ -275,7 +277,7 @@ impl Menders for Fake {
         &self,
         scan: &[u8],
         search: &Search,
-        _: Wanted<'_>,
+        _: Cancellation<'_>,
     ) -> Result<v1::AnchorFound, Refusal> {
         self.act(scan)?;
         Ok(found(search))
@@ -285,7 +287,7 @@ impl Menders for Fake {
         &self,
         scan: &[u8],
         search: &Search,
-        wanted: Wanted<'_>,
+        wanted: Cancellation<'_>,
     ) -> Result<Mended, Refusal> {
         let anchor = Anchor {
             hole: search.hole,
@@ -301,7 +303,12 @@ impl Menders for Fake {
         self.inpaint(scan, &constraints, wanted)
     }
 
-    fn open(&self, scan: &[u8], _: &Constraints, _: Wanted<'_>) -> Result<Box<dyn Kept>, Refusal> {
+    fn open(
+        &self,
+        scan: &[u8],
+        _: &Constraints,
+        _: Cancellation<'_>,
+    ) -> Result<Box<dyn EditSession>, Refusal> {
         self.act(scan)?;
         Ok(Box::new(FakeKept::new(self, scan)))
     }

@@ -30,7 +30,7 @@ async fn the_committed_document_is_the_served_one() {
 
 #[test]
 fn every_reference_has_its_schema() {
-    let document = darn::serve::openapi::document();
+    let document = darn_serve::openapi::document();
     let schemas = document["components"]["schemas"].as_object().unwrap();
     let mut open = vec![&document];
     while let Some(value) = open.pop() {
@@ -60,7 +60,7 @@ fn every_reference_has_its_schema() {
 #[tokio::test]
 async fn every_path_is_routed_for_its_methods() {
     let service = Service::start(&[]).await;
-    let document = darn::serve::openapi::document();
+    let document = darn_serve::openapi::document();
     for (path, methods) in document["paths"].as_object().unwrap() {
         let path = path.replace("{id}", "0");
         for method in methods.as_object().unwrap().keys() {

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use axum::{body::Body, extract::Request};
-use darn::serve::router;
+use darn_serve::router;
 use reqwest::{
     Method, Response,
     multipart::{Form, Part},

@@ -9,7 +9,7 @@ use std::{
 };
 
 use clap::Parser;
-use darn::serve::{healthcheck, run};
+use darn_serve::{healthcheck, run};
 
 use crate::harness::{Fake, Settings};
 

@@ -1,0 +1,40 @@
+//! Generates the contract's types from `proto/`, without an installed `protoc`.
+//!
+//! protox parses the files; prost and tonic write messages and the gRPC service, pbjson the canonical proto3 JSON of the same messages.
+//! The descriptor itself is kept beside them: the OpenAPI document takes its schemas from it, so that they cannot drift.
+
+use std::{env, error::Error, fs, path::PathBuf};
+
+use prost::Message as _;
+
+const FILES: [&str; 1] = ["darn/v1/darn.proto"];
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let root = PathBuf::from(env::var("CARGO_MANIFEST_DIR")?).join("../../proto");
+    let out = PathBuf::from(env::var("OUT_DIR")?);
+    for file in FILES {
+        println!("cargo:rerun-if-changed={}", root.join(file).display());
+    }
+
+    let descriptors = protox::Compiler::new([&root])?
+        .include_source_info(true)
+        .include_imports(true)
+        .open_files(FILES)?
+        .file_descriptor_set();
+    let bytes = descriptors.encode_to_vec();
+    fs::write(out.join("darn.descriptors.bin"), &bytes)?;
+
+    tonic_prost_build::configure()
+        .compile_well_known_types(true)
+        .extern_path(".google.protobuf", "::pbjson_types")
+        .bytes(".darn.v1")
+        .emit_rerun_if_changed(false)
+        .compile_fds(descriptors)?;
+
+    pbjson_build::Builder::new()
+        .register_descriptors(&bytes)?
+        .extern_path(".google.protobuf", "::pbjson_types")
+        .emit_fields()
+        .build(&[".darn.v1"])?;
+    Ok(())
+}

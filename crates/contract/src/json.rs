@@ -1,0 +1,385 @@
+//! Reads a message from its canonical proto3 JSON and says where it is wrong.
+//!
+//! The generated deserializers name what they did not expect, but not where; and they buffer numbers in a way that
+//! serde_json's `arbitrary_precision` (which `scan` needs) breaks. So the text is parsed to a value first, and the value is
+//! walked by a deserializer of its own, which hands out plain numbers and keeps the JSON pointer of the fault.
+
+use std::fmt;
+
+use serde::de::{
+    DeserializeOwned, DeserializeSeed, Deserializer, Error as _, Expected, IntoDeserializer,
+    MapAccess, SeqAccess, Unexpected, Visitor, value::StrDeserializer,
+};
+use serde_json::{Map, Value};
+
+use super::FieldError;
+
+/// Why a text is not a message.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum JsonError {
+    /// The text is not JSON.
+    #[error("not JSON: {detail}")]
+    Syntax {
+        /// What is wrong, with line and column.
+        detail: String,
+    },
+    /// The text is JSON of another shape.
+    #[error("{0}")]
+    Shape(FieldError),
+}
+
+/// Reads a message; unknown fields are refused.
+///
+/// # Errors
+/// `Syntax` when the text is not JSON, `Shape` with the place when it is not such a message.
+pub fn from_json<T: DeserializeOwned>(text: &[u8]) -> Result<T, JsonError> {
+    let value = darn_json::value(text).map_err(|error| JsonError::Syntax {
+        detail: error.to_string(),
+    })?;
+    T::deserialize(Node::bare(&value)).map_err(|fault| JsonError::Shape(fault.into_field_error()))
+}
+
+/// A fault and the way to it, innermost step first.
+#[derive(Debug)]
+struct Fault {
+    detail: String,
+    steps: Vec<String>,
+}
+
+impl Fault {
+    fn under(mut self, step: impl Into<String>) -> Self {
+        self.steps.push(step.into());
+        self
+    }
+
+    fn into_field_error(self) -> FieldError {
+        let pointer = self.steps.iter().rev().fold(String::new(), |way, step| {
+            way + "/" + &step.replace('~', "~0").replace('/', "~1")
+        });
+        FieldError::new(pointer, self.detail)
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.detail)
+    }
+}
+
+impl std::error::Error for Fault {}
+
+impl serde::de::Error for Fault {
+    fn custom<T: fmt::Display>(detail: T) -> Self {
+        let mut detail = detail.to_string();
+        // What serde says of an untagged enum tells a caller nothing; the generated code uses one for every number.
+        if detail.starts_with("data did not match any variant") {
+            detail = "expected a number of this field's range".to_owned();
+        }
+        Self {
+            detail,
+            steps: Vec::new(),
+        }
+    }
+
+    /// In the words of JSON; serde's are Rust's.
+    fn invalid_type(unexpected: Unexpected<'_>, expected: &dyn Expected) -> Self {
+        let got = match unexpected {
+            Unexpected::Unit | Unexpected::Option => "null".to_owned(),
+            Unexpected::Bool(flag) => flag.to_string(),
+            Unexpected::Unsigned(number) => format!("the number {number}"),
+            Unexpected::Signed(number) => format!("the number {number}"),
+            Unexpected::Float(number) => format!("the number {number}"),
+            Unexpected::Str(_) => "a string".to_owned(),
+            Unexpected::Seq => "an array".to_owned(),
+            Unexpected::Map => "an object".to_owned(),
+            other => other.to_string(),
+        };
+        let expected = expected.to_string();
+        let expected = match expected.as_str() {
+            "a sequence" => "an array",
+            text if text.starts_with("struct ") => "an object",
+            text => text,
+        };
+        Self::custom(format!("expected {expected}; got {got}"))
+    }
+}
+
+/// One value, read as it describes itself.
+struct Node<'v> {
+    value: &'v Value,
+    /// What null is here: in proto3 JSON a field that is null is absent; anywhere else null is itself.
+    null: Null,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Null {
+    Itself,
+    Absent,
+}
+
+impl<'v> Node<'v> {
+    fn bare(value: &'v Value) -> Self {
+        let null = Null::Itself;
+        Self { value, null }
+    }
+
+    fn field(value: &'v Value) -> Self {
+        let null = Null::Absent;
+        Self { value, null }
+    }
+
+    fn is_absent(&self) -> bool {
+        self.value.is_null() && self.null == Null::Absent
+    }
+}
+
+/// The natural or negative number a real one equals: proto3 JSON lets an integer be written `1.0`. Beyond 2^53 a real number
+/// no longer tells which integer is meant.
+fn whole(real: f64) -> Option<i64> {
+    let exact = real.fract() == 0.0 && real.abs() <= 9_007_199_254_740_992.0;
+    // Minus zero is no integer.
+    (exact && !(real == 0.0 && real.is_sign_negative())).then_some(real as i64)
+}
+
+impl<'de> Deserializer<'de> for Node<'_> {
+    type Error = Fault;
+
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        match self.value {
+            Value::Null => visitor.visit_unit(),
+            Value::Bool(flag) => visitor.visit_bool(*flag),
+            Value::String(text) => visitor.visit_str(text),
+            Value::Number(number) => {
+                if let Some(natural) = number.as_u64() {
+                    visitor.visit_u64(natural)
+                } else if let Some(integer) = number.as_i64() {
+                    visitor.visit_i64(integer)
+                } else if let Some(real) = number.as_f64() {
+                    match whole(real) {
+                        Some(integer) => match u64::try_from(integer) {
+                            Ok(natural) => visitor.visit_u64(natural),
+                            Err(_) => visitor.visit_i64(integer),
+                        },
+                        None => visitor.visit_f64(real),
+                    }
+                } else {
+                    Err(Fault::custom("the number is out of range"))
+                }
+            }
+            Value::Array(items) => visitor.visit_seq(Items {
+                rest: items.iter(),
+                index: 0,
+            }),
+            Value::Object(fields) => visitor.visit_map(Fields {
+                rest: fields.iter(),
+                pending: None,
+            }),
+        }
+    }
+
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        match self.value {
+            Value::Null => visitor.visit_none(),
+            _ => visitor.visit_some(self),
+        }
+    }
+
+    fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        if self.is_absent() {
+            return visitor.visit_seq(Items {
+                rest: [].iter(),
+                index: 0,
+            });
+        }
+        self.deserialize_any(visitor)
+    }
+
+    fn deserialize_bool<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+        if self.is_absent() {
+            return visitor.visit_bool(false);
+        }
+        self.deserialize_any(visitor)
+    }
+
+    fn deserialize_newtype_struct<V: Visitor<'de>>(
+        self,
+        _name: &'static str,
+        visitor: V,
+    ) -> Result<V::Value, Fault> {
+        visitor.visit_newtype_struct(self)
+    }
+
+    serde::forward_to_deserialize_any! {
+        i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct
+        tuple tuple_struct map struct enum identifier ignored_any
+    }
+}
+
+struct Items<'v> {
+    rest: std::slice::Iter<'v, Value>,
+    index: usize,
+}
+
+impl<'de> SeqAccess<'de> for Items<'_> {
+    type Error = Fault;
+
+    fn next_element_seed<T: DeserializeSeed<'de>>(
+        &mut self,
+        seed: T,
+    ) -> Result<Option<T::Value>, Fault> {
+        let Some(value) = self.rest.next() else {
+            return Ok(None);
+        };
+        let index = self.index;
+        self.index += 1;
+        seed.deserialize(Node::bare(value))
+            .map(Some)
+            .map_err(|fault| fault.under(index.to_string()))
+    }
+
+    fn size_hint(&self) -> Option<usize> {
+        Some(self.rest.len())
+    }
+}
+
+struct Fields<'v> {
+    rest: <&'v Map<String, Value> as IntoIterator>::IntoIter,
+    pending: Option<(&'v str, &'v Value)>,
+}
+
+impl<'de> MapAccess<'de> for Fields<'_> {
+    type Error = Fault;
+
+    fn next_key_seed<K: DeserializeSeed<'de>>(
+        &mut self,
+        seed: K,
+    ) -> Result<Option<K::Value>, Fault> {
+        let Some((key, value)) = self.rest.next() else {
+            return Ok(None);
+        };
+        self.pending = Some((key, value));
+        let name: StrDeserializer<'_, Fault> = key.as_str().into_deserializer();
+        seed.deserialize(name)
+            .map(Some)
+            .map_err(|fault| fault.under(key))
+    }
+
+    fn next_value_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<S::Value, Fault> {
+        let (key, value) = self
+            .pending
+            .take()
+            .ok_or_else(|| Fault::custom("a value without its name"))?;
+        seed.deserialize(Node::field(value))
+            .map_err(|fault| fault.under(key))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::v1;
+
+    fn fault(text: &str) -> (String, String) {
+        match from_json::<v1::Constraints>(text.as_bytes()) {
+            Err(JsonError::Shape(FieldError { pointer, detail })) => (pointer, detail),
+            other => panic!("{text} gave {other:?}"),
+        }
+    }
+
+    #[test]
+    fn the_example_of_the_design_is_read() {
+        let text = r#"{
+            "holes":   [{"id": 2}, {"near": [0.1, 1.2, 0]}, {"cut": {"center": [0.4, 1.0, 0.1], "radius": 5e-2}}],
+            "anchors": [{"hole": 2, "uv": [0.48, 0.52], "position": [0.11, 1.18, 0.02]},
+                        {"hole": 2, "position": [0.11, 1.18, 0.02], "hard": true}],
+            "edits":   [{"hole": 2, "grab":  {"uv": [0.5, 0.5], "offset": [0, 0.05, 0]}},
+                        {"hole": 2, "twist": {"uv": [0.5, 0.5], "radius": 0.125, "axis": [0, 1, 0], "angle": 0.7}},
+                        {"hole": 2, "pinch": {"uvs": [[0.44, 0.23], [0.44, 0.68]], "amount": 0.6}}],
+            "weights": "standard",
+            "up": [0, 1, 0]
+        }"#;
+        let read: v1::Constraints = from_json(text.as_bytes()).unwrap();
+        assert_eq!(read.holes[1].near, [0.1, 1.2, 0.0]);
+        assert_eq!(read.anchors[0].position, [0.11, 1.18, 0.02]);
+        assert!(read.anchors[1].hard);
+        let Some(v1::edit::Gesture::Pinch(pinch)) = &read.edits[2].gesture else {
+            panic!("{read:?}");
+        };
+        assert_eq!(pinch.uvs.len(), 2);
+        assert_eq!(pinch.uvs[0].values.len(), 2);
+
+        let written = serde_json::to_vec(&read).unwrap();
+        assert_eq!(from_json::<v1::Constraints>(&written).unwrap(), read);
+    }
+
+    #[test]
+    fn a_fault_names_its_place() {
+        assert_eq!(fault(r#"{"hole": []}"#).0, "/hole");
+        assert_eq!(
+            fault(r#"{"holes": [{"id": 1}, {"i~/d": 2}]}"#).0,
+            "/holes/1/i~0~1d"
+        );
+        assert_eq!(fault(r#"{"holes": [{"id": -1}]}"#).0, "/holes/0/id");
+        assert_eq!(
+            fault(r#"{"anchors": [{"uv": [0.5, {}]}]}"#),
+            (
+                "/anchors/0/uv/1".into(),
+                "expected a number of this field's range".into()
+            )
+        );
+        assert_eq!(
+            fault(r#"{"anchors": [{"uv": [0.5, 1e999]}]}"#).0,
+            "/anchors/0/uv/1"
+        );
+        assert_eq!(fault("[1]").0, "");
+        assert!(fault(r#"{"hole": []}"#).1.contains("unknown field"));
+    }
+
+    #[test]
+    fn null_is_absent_and_integers_may_have_a_point() {
+        let text = r#"{"holes": null, "anchors": [{"hole": 2.0, "uv": null, "position": [1.0, -2.0, 5e-1], "hard": null}],
+            "edits": null, "weights": null, "up": null}"#;
+        let read: v1::Constraints = from_json(text.as_bytes()).unwrap();
+        let anchor = v1::Anchor {
+            hole: Some(2),
+            position: vec![1.0, -2.0, 0.5],
+            ..Default::default()
+        };
+        let expected = v1::Constraints {
+            anchors: vec![anchor],
+            ..Default::default()
+        };
+        assert_eq!(read, expected);
+        let edit =
+            r#"{"edits": [{"grab": null, "hole": null}], "holes": [{"cut": null, "id": 1e1}]}"#;
+        let read: v1::Constraints = from_json(edit.as_bytes()).unwrap();
+        assert_eq!((read.edits[0].hole, read.holes[0].id), (None, Some(10)));
+
+        for (text, at) in [
+            (r#"{"hole": null}"#, "/hole"),
+            (r#"{"holes": [null]}"#, "/holes/0"),
+            (r#"{"holes": [{"id": 1.5}]}"#, "/holes/0/id"),
+            (r#"{"holes": [{"id": -1.0}]}"#, "/holes/0/id"),
+        ] {
+            assert_eq!(fault(text).0, at, "{text}");
+        }
+        assert_eq!(
+            fault("null"),
+            (String::new(), "expected an object; got null".into())
+        );
+        assert_eq!(
+            fault(r#"{"holes": 7}"#).1,
+            "expected an array; got the number 7"
+        );
+    }
+
+    #[test]
+    fn a_text_that_is_not_json_is_told_apart() {
+        for text in ["", "{", "{\"holes\": [}", "{} {}", "\u{0}"] {
+            assert!(matches!(
+                from_json::<v1::Constraints>(text.as_bytes()),
+                Err(JsonError::Syntax { .. })
+            ));
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! Triangle meshes as plain arrays: welding, topology, boundary loops, regions, self-intersection, curvature.
+//! Small free functions on `TriMesh`, one idea a file; everything is in scene units and f64.
+//! No glTF, no charts, no grids, no files: those rooms stand on this one.
+
+mod boxes;
+mod collar;
+pub mod curvature;
+pub mod denoise;
+pub mod geodesic;
+mod growth;
+pub mod intersect;
+pub mod layers;
+pub mod loops;
+pub mod nearest;
+pub mod region;
+pub mod topology;
+pub mod weld;
+
+pub mod shapes;
+
+use std::collections::HashMap;
+
+/// A point or direction in the plane of a chart.
+pub type Vec2 = nalgebra::Vector2<f64>;
+/// A point or direction in scene space.
+pub type Vec3 = nalgebra::Vector3<f64>;
+
+/// An indexed triangle mesh; faces are counter-clockwise seen from outside.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TriMesh {
+    /// Vertex positions, scene space.
+    pub positions: Vec<Vec3>,
+    /// Vertex indices of every triangle; each is below `positions.len()`.
+    pub faces: Vec<[u32; 3]>,
+}
+
+impl TriMesh {
+    /// The three corner positions of a face.
+    ///
+    /// # Panics
+    /// When `face` or one of its vertices does not exist; welded meshes and regions keep both in range.
+    pub fn triangle(&self, face: usize) -> [Vec3; 3] {
+        self.faces[face].map(|v| self.positions[v as usize])
+    }
+
+    /// The mesh of some of its faces, with the vertices they use, in the order of first use.
+    pub fn part(&self, faces: impl IntoIterator<Item = [u32; 3]>) -> TriMesh {
+        let mut index = HashMap::new();
+        let mut part = TriMesh::default();
+        for face in faces {
+            part.faces.push(face.map(|v| {
+                *index.entry(v).or_insert_with(|| {
+                    part.positions.push(self.positions[v as usize]);
+                    part.positions.len() as u32 - 1
+                })
+            }));
+        }
+        part
+    }
+
+    /// The interior angle at `corner` (0..3) of a face, radians in `[0, π]`; 0 for a corner with a zero-length side.
+    pub fn corner_angle(&self, face: usize, corner: usize) -> f64 {
+        let p = self.triangle(face);
+        let (a, b) = (
+            p[(corner + 1) % 3] - p[corner],
+            p[(corner + 2) % 3] - p[corner],
+        );
+        let unit = unit_for(a.amax().max(b.amax()));
+        let (a, b) = (a / unit, b / unit);
+        a.cross(&b).norm().atan2(a.dot(&b))
+    }
+}
+
+/// What to divide lengths of this size by so that their products neither overflow nor vanish: 1 for any size met outside attacks.
+fn unit_for(size: f64) -> f64 {
+    if size == 0.0 || (1e-100..1e100).contains(&size) {
+        1.0
+    } else {
+        size
+    }
+}

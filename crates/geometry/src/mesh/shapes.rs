@@ -1,0 +1,116 @@
+//! Simple surfaces with known answers, for tests, benchmarks and examples.
+
+use std::collections::HashMap;
+use std::f64::consts::TAU;
+
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::{TriMesh, Vec3};
+
+/// An `n` × `n` grid of squares, two triangles each, over [0, 1]² as (u, v), bent by `place`; squares whose middle `keep` refuses
+/// are left out. Unused vertices stay.
+pub fn sheet(
+    n: usize,
+    keep: impl Fn(f64, f64) -> bool,
+    place: impl Fn(f64, f64) -> Vec3,
+) -> TriMesh {
+    let at = |i: usize| i as f64 / n as f64;
+    let positions = (0..(n + 1) * (n + 1))
+        .map(|v| place(at(v % (n + 1)), at(v / (n + 1))))
+        .collect();
+    let mut faces = Vec::new();
+    for (i, j) in (0..n * n).map(|q| (q % n, q / n)) {
+        let half = 0.5 / n as f64;
+        if keep(at(i) + half, at(j) + half) {
+            let a = (j * (n + 1) + i) as u32;
+            let (b, c) = (a + 1, a + n as u32 + 1);
+            faces.extend([[a, b, c], [b, c + 1, c]]);
+        }
+    }
+    TriMesh { positions, faces }
+}
+
+/// A unit square in the plane z = 0 with a round hole of radius `hole` in its middle.
+pub fn holed_sheet(n: usize, hole: f64) -> TriMesh {
+    sheet(
+        n,
+        |u, v| (u - 0.5).hypot(v - 0.5) > hole,
+        |u, v| Vec3::new(u, v, 0.0),
+    )
+}
+
+/// A tube of radius 1 and length 4, `n` squares around and long; squares for which `keep(angle / 2π, height / 4)` fails are left out.
+/// The positions close up exactly; the seam is two columns of vertices.
+pub fn tube(n: usize, keep: impl Fn(f64, f64) -> bool) -> TriMesh {
+    sheet(n, keep, |u, v| {
+        let angle = if u == 1.0 { 0.0 } else { u * TAU };
+        Vec3::new(angle.cos(), angle.sin(), 4.0 * v)
+    })
+}
+
+/// Shifts every position (equal positions alike) by up to `amount` in each direction.
+pub fn shaken(mesh: &TriMesh, amount: f64, seed: u64) -> TriMesh {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut shifts: HashMap<[u64; 3], Vec3> = HashMap::new();
+    let positions = mesh.positions.iter().map(|p| {
+        let key = [p.x, p.y, p.z].map(f64::to_bits);
+        p + *shifts
+            .entry(key)
+            .or_insert_with(|| Vec3::from_fn(|_, _| rng.random_range(-amount..=amount)))
+    });
+    TriMesh {
+        positions: positions.collect(),
+        faces: mesh.faces.clone(),
+    }
+}
+
+/// The same triangles with vertices in another order.
+pub fn shuffled(mesh: &TriMesh, seed: u64) -> TriMesh {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut order: Vec<usize> = (0..mesh.positions.len()).collect();
+    for i in (1..order.len()).rev() {
+        order.swap(i, rng.random_range(0..=i));
+    }
+    let mut to = vec![0; order.len()];
+    for (new, &old) in order.iter().enumerate() {
+        to[old] = new as u32;
+    }
+    TriMesh {
+        positions: order.iter().map(|&old| mesh.positions[old]).collect(),
+        faces: mesh
+            .faces
+            .iter()
+            .map(|f| f.map(|v| to[v as usize]))
+            .collect(),
+    }
+}
+
+/// The same triangles, none sharing a vertex.
+pub fn exploded(mesh: &TriMesh) -> TriMesh {
+    TriMesh {
+        positions: mesh
+            .faces
+            .iter()
+            .flatten()
+            .map(|&v| mesh.positions[v as usize])
+            .collect(),
+        faces: (0..mesh.faces.len() as u32)
+            .map(|f| [3 * f, 3 * f + 1, 3 * f + 2])
+            .collect(),
+    }
+}
+
+/// Both meshes as one.
+pub fn together(a: &TriMesh, b: &TriMesh) -> TriMesh {
+    let shift = a.positions.len() as u32;
+    TriMesh {
+        positions: a.positions.iter().chain(&b.positions).copied().collect(),
+        faces: a
+            .faces
+            .iter()
+            .copied()
+            .chain(b.faces.iter().map(|f| f.map(|v| v + shift)))
+            .collect(),
+    }
+}

@@ -1,0 +1,239 @@
+//! The node hierarchy of the default scene: which meshes are drawn, and where.
+
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion};
+
+use super::json::Place;
+use super::{Limits, ScanError};
+use darn_geometry::mesh::Vec3;
+
+/// An affine map, accumulated in f64: x ↦ `linear` x + `offset`.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Placement {
+    pub linear: Matrix3<f64>,
+    pub offset: Vec3,
+}
+
+/// A node of the default scene that draws a mesh.
+#[derive(Debug, Clone)]
+pub(super) struct Drawn {
+    pub node: usize,
+    pub mesh: usize,
+    pub placement: Placement,
+}
+
+impl Placement {
+    pub fn identity() -> Self {
+        Self {
+            linear: Matrix3::identity(),
+            offset: Vec3::zeros(),
+        }
+    }
+
+    pub fn point(&self, local: Vec3) -> Vec3 {
+        self.linear * local + self.offset
+    }
+
+    /// Whether faces turn round: a negative determinant (glTF 2.0, 3.7.4).
+    pub fn mirrors(&self) -> bool {
+        self.linear.determinant() < 0.0
+    }
+
+    /// The map back, or `None` when this one flattens space (relative volume below 1e-12).
+    pub fn inverse(&self) -> Option<Self> {
+        let volume: f64 = self
+            .linear
+            .column_iter()
+            .map(|column| column.norm())
+            .product();
+        let regular = self.linear.determinant().abs() > 1e-12 * volume;
+        let linear = self
+            .linear
+            .try_inverse()
+            .filter(|m| regular && m.iter().all(|x| x.is_finite()))?;
+        Some(Self {
+            linear,
+            offset: -(linear * self.offset),
+        })
+    }
+
+    fn then(&self, child: &Self) -> Self {
+        Self {
+            linear: self.linear * child.linear,
+            offset: self.point(child.offset),
+        }
+    }
+}
+
+/// The drawn meshes of the default scene, depth first in the file's order.
+///
+/// Without `scene` the first scene is taken, without scenes every node that is nobody's child. Skins are not applied: a skinned
+/// mesh stands in its bind pose, as stored, untouched by its node's transform; morph targets likewise have weight 0.
+pub(super) fn drawn(root: &Place<'_>, limits: &Limits) -> Result<Vec<Drawn>, ScanError> {
+    let nodes = match root.get("nodes")? {
+        Some(nodes) => nodes.array()?.len(),
+        None => return Ok(Vec::new()),
+    };
+    let mut seen = vec![false; nodes];
+    let mut open = roots(root)?;
+    open.reverse();
+    let (mut out, mut visited) = (Vec::new(), 0);
+    while let Some(Step {
+        from,
+        index,
+        node,
+        parent,
+    }) = open.pop()
+    {
+        visited += 1;
+        if visited > limits.max_nodes {
+            return Err(ScanError::Limit {
+                pointer: node.pointer,
+                limit: "max_nodes",
+                allowed: limits.max_nodes,
+                found: visited,
+            });
+        }
+        if seen
+            .get_mut(index)
+            .is_none_or(|seen| std::mem::replace(seen, true))
+        {
+            let detail = format!("node {index} is reached a second time: a cycle or two parents");
+            return Err(ScanError::Invalid {
+                pointer: from,
+                detail,
+            });
+        }
+        let placement = parent.then(&local(&node)?);
+        if let Some(reference) = node.get("mesh")? {
+            let (mesh, _) = root.referred("meshes", &reference)?;
+            // Only its joints move a skinned mesh (glTF 2.0, 3.7.3.3).
+            let placement = match node.get("skin")? {
+                Some(_) => Placement::identity(),
+                None => placement.clone(),
+            };
+            out.push(Drawn {
+                node: index,
+                mesh,
+                placement,
+            });
+        }
+        if let Some(children) = node.get("children")? {
+            let first = open.len();
+            for child in children.items()? {
+                open.push(Step::new(root, child, placement.clone())?);
+            }
+            if let Some(children) = open.get_mut(first..) {
+                children.reverse();
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// A node still to be visited.
+struct Step<'a> {
+    /// Pointer to what refers to it.
+    from: String,
+    index: usize,
+    node: Place<'a>,
+    parent: Placement,
+}
+
+impl<'a> Step<'a> {
+    fn new(root: &Place<'a>, reference: Place<'a>, parent: Placement) -> Result<Self, ScanError> {
+        let (index, node) = root.referred("nodes", &reference)?;
+        Ok(Self {
+            from: reference.pointer,
+            index,
+            node,
+            parent,
+        })
+    }
+}
+
+/// The root nodes of the default scene.
+fn roots<'a>(root: &Place<'a>) -> Result<Vec<Step<'a>>, ScanError> {
+    let scene = match (root.get("scene")?, root.get("scenes")?) {
+        (Some(reference), _) => Some(root.referred("scenes", &reference)?.1),
+        (None, Some(scenes)) => scenes.items()?.next(),
+        (None, None) => None,
+    };
+    let Some(scene) = scene else {
+        return orphans(root);
+    };
+    match scene.get("nodes")? {
+        Some(nodes) => nodes
+            .items()?
+            .map(|node| Step::new(root, node, Placement::identity()))
+            .collect(),
+        None => Ok(Vec::new()),
+    }
+}
+
+/// The nodes that are nobody's child.
+fn orphans<'a>(root: &Place<'a>) -> Result<Vec<Step<'a>>, ScanError> {
+    let nodes: Vec<Place<'a>> = root.need("nodes")?.items()?.collect();
+    let mut child = vec![false; nodes.len()];
+    for node in &nodes {
+        if let Some(children) = node.get("children")? {
+            for reference in children.items()? {
+                let (index, _) = root.referred("nodes", &reference)?;
+                child
+                    .iter_mut()
+                    .skip(index)
+                    .take(1)
+                    .for_each(|child| *child = true);
+            }
+        }
+    }
+    let steps = nodes
+        .into_iter()
+        .enumerate()
+        .zip(child)
+        .filter(|(_, child)| !child)
+        .map(|((index, node), _)| Step {
+            from: node.pointer.clone(),
+            index,
+            node,
+            parent: Placement::identity(),
+        });
+    Ok(steps.collect())
+}
+
+/// A node's own transform: its matrix, or translation · rotation · scale.
+fn local(node: &Place<'_>) -> Result<Placement, ScanError> {
+    if let Some(place) = node.get("matrix")? {
+        let m = place.numbers::<16>()?;
+        let affine = [m[3], m[7], m[11], m[15] - 1.0]
+            .iter()
+            .all(|x| x.abs() < 1e-6);
+        if !affine {
+            return Err(place.invalid("the last row must be 0 0 0 1"));
+        }
+        return Ok(Placement {
+            linear: Matrix3::new(m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10]),
+            offset: Vec3::new(m[12], m[13], m[14]),
+        });
+    }
+    let triple = |key: &str, default: [f64; 3]| {
+        node.get(key)?
+            .map_or(Ok(default), |place| place.numbers::<3>())
+    };
+    let offset = Vec3::from(triple("translation", [0.0; 3])?);
+    let scale = Matrix3::from_diagonal(&Vec3::from(triple("scale", [1.0; 3])?));
+    let rotation = match node.get("rotation")? {
+        Some(place) => {
+            let [x, y, z, w] = place.numbers::<4>()?;
+            // Stored quaternions are unit only up to their rounding.
+            UnitQuaternion::try_new(Quaternion::new(w, x, y, z), f64::MIN_POSITIVE)
+                .ok_or_else(|| place.invalid("must be a unit quaternion"))?
+                .to_rotation_matrix()
+                .into_inner()
+        }
+        None => Matrix3::identity(),
+    };
+    Ok(Placement {
+        linear: rotation * scale,
+        offset,
+    })
+}

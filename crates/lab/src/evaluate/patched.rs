@@ -1,0 +1,85 @@
+//! A filled grid after `patch`: the known cells meshed as a scan whose chart is the grid itself, patched, and read back at the cells.
+
+use darn_geometry::flatten::{Chart, Frame};
+use darn_geometry::grid::{CELLS, Grid, cell_centre};
+use darn_geometry::mesh::loops::boundary_loops;
+use darn_geometry::mesh::region::{Region, grow};
+use darn_geometry::mesh::topology::Topology;
+use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
+use darn_geometry::patch::{self, Options, Patch, PatchError, signed_area};
+
+use super::measure::faces;
+
+/// The filled grid with every hole cell where the patch has it. Cells of holes that no patch covers keep the fill.
+///
+/// `grid` holds what is known, `filled` one position per cell; `hole` marks the cells to be patched.
+///
+/// # Errors
+/// See [`patch::build`].
+pub fn patched(
+    grid: &Grid,
+    hole: &[bool],
+    filled: &[Vec3],
+    options: &Options,
+) -> Result<Vec<Vec3>, PatchError> {
+    let mesh = TriMesh {
+        positions: grid.positions.clone(),
+        faces: faces(&grid.known),
+    };
+    let topology = Topology::new(&mesh);
+    let loops = boundary_loops(&mesh, &topology);
+    let mut answer = filled.to_vec();
+    for rim in &loops {
+        let polygon: Vec<Vec2> = rim
+            .vertices
+            .iter()
+            .map(|&v| cell_centre(v as usize))
+            .collect();
+        // Cloth lies left of its boundary, so a hole's rim runs clockwise round it in the chart.
+        let own: Vec<usize> = if signed_area(&polygon) < 0.0 {
+            (0..CELLS)
+                .filter(|&k| hole[k] && inside(&polygon, cell_centre(k)))
+                .collect()
+        } else {
+            Vec::new()
+        };
+        if own.is_empty() {
+            continue;
+        }
+        let Ok(region) = grow(&mesh, &topology, &loops, rim.id as usize, f64::INFINITY) else {
+            continue;
+        };
+        let chart = grid_chart(&region);
+        let patch: Patch = patch::build(&region, &chart, filled, options)?;
+        for cell in own {
+            answer[cell] = patch.at(cell_centre(cell));
+        }
+    }
+    Ok(answer)
+}
+
+/// The chart in which every cell is where the grid has it; uv and the plane are one.
+fn grid_chart(region: &Region) -> Chart {
+    let flat = region.vertices.iter().map(|&v| cell_centre(v as usize));
+    Chart {
+        flat: flat.collect(),
+        frame: Frame {
+            origin: Vec2::zeros(),
+            axis: Vec2::x(),
+            side: 1.0,
+        },
+        stretch_mean: 1.0,
+        stretch_max: 1.0,
+        flipped: 0,
+        rounds: 0,
+    }
+}
+
+/// Whether a point lies in a polygon (even–odd rule).
+pub(super) fn inside(polygon: &[Vec2], p: Vec2) -> bool {
+    let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
+    let crossed = edges.filter(|(a, b)| {
+        (a.y <= p.y) != (b.y <= p.y) && a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x) > p.x
+    });
+    crossed.count() % 2 == 1
+}

@@ -1,0 +1,395 @@
+//! Holes on the 64×64 grid: circle, ring and percolation as in the paper, and the tears and ragged blobs that worn cloth has.
+//!
+//! A hole takes about 0.3 to 0.65 of the grid's side, as in the regions that `flatten` cuts out, sometimes up to 0.88, and stays clear of the grid's border.
+//! A mask is `CELLS` flags, true in the hole, in the grid's order.
+
+use darn_geometry::grid::{CELLS, SIDE};
+use rand::Rng;
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+use std::f32::consts::{PI, TAU};
+
+/// Cells between a hole and the grid's border, at least.
+pub const MARGIN: usize = 3;
+/// Least and greatest share of the grid's cells that all holes of a mask take.
+pub const SHARE: (f32, f32) = (0.04, 0.5);
+/// Share of holes so large that little cloth is left around them, as where a region cannot grow further.
+const LARGE: f64 = 0.15;
+
+/// The kinds of holes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shape {
+    /// A disk.
+    Circle,
+    /// A ring around an island of cloth.
+    Ring,
+    /// Ragged: grown by invasion of a random field.
+    Percolation,
+    /// Long and thin, with a bent course and a ragged edge.
+    Tear,
+    /// Star-shaped with a wavy edge.
+    Blob,
+}
+
+/// All shapes, each with its share among drawn holes.
+pub const SHAPES: [(Shape, f32); 5] = [
+    (Shape::Circle, 0.18),
+    (Shape::Ring, 0.07),
+    (Shape::Percolation, 0.27),
+    (Shape::Tear, 0.20),
+    (Shape::Blob, 0.28),
+];
+
+/// A point of the grid in cells.
+type Place = [f32; 2];
+
+/// Draws a mask of one hole, sometimes two.
+pub fn draw(rng: &mut impl Rng) -> Vec<bool> {
+    draw_kind(rng).1
+}
+
+/// [`draw`], and the shape of the first hole.
+pub fn draw_kind(rng: &mut impl Rng) -> (Shape, Vec<bool>) {
+    let mut at = rng.random_range(0.0..1.0f32);
+    let mut shape = Shape::Blob;
+    for (candidate, share) in SHAPES {
+        if at < share {
+            shape = candidate;
+            break;
+        }
+        at -= share;
+    }
+    let first = draw_shape(shape, rng);
+    if rng.random_bool(0.88) {
+        return (shape, first);
+    }
+    (shape, beside(first, rng))
+}
+
+/// Draws a mask of one hole of the given shape, somewhere near the middle.
+pub fn draw_shape(shape: Shape, rng: &mut impl Rng) -> Vec<bool> {
+    loop {
+        let extent = SIDE as f32
+            * if rng.random_bool(LARGE) {
+                rng.random_range(0.65..0.88)
+            } else {
+                rng.random_range(0.30..0.65)
+            };
+        let middle = [place(rng), place(rng)];
+        let mask = match shape {
+            Shape::Circle => disk(middle, 0.0, 0.5 * extent),
+            Shape::Ring => disk(
+                middle,
+                0.5 * extent * rng.random_range(0.25..0.6),
+                0.5 * extent,
+            ),
+            Shape::Percolation => percolation(middle, 0.5 * extent, rng),
+            Shape::Tear => tear(middle, extent * 1.2, rng),
+            Shape::Blob => blob(middle, 0.45 * extent, rng),
+        };
+        let mask = clear_border(mask);
+        let mask = if shape == Shape::Ring {
+            mask
+        } else {
+            fill_islands(largest_piece(mask))
+        };
+        let share = mask.iter().filter(|&&m| m).count() as f32 / CELLS as f32;
+        if share >= SHARE.0 && share <= SHARE.1 {
+            return mask;
+        }
+    }
+}
+
+fn place(rng: &mut impl Rng) -> f32 {
+    SIDE as f32 * rng.random_range(0.38..0.62)
+}
+
+/// Adds a second, smaller hole where there is room for it; otherwise leaves the mask as it is.
+fn beside(first: Vec<bool>, rng: &mut impl Rng) -> Vec<bool> {
+    let away = distance(&first);
+    for _ in 0..20 {
+        let middle = [0, 1].map(|_| rng.random_range(0.15..0.85) * SIDE as f32);
+        let radius = rng.random_range(3.0..8.0);
+        let second = clear_border(blob(middle, radius, rng));
+        let clear = second.iter().zip(&away).all(|(&m, &d)| !m || d > 4.0);
+        let both: Vec<bool> = first.iter().zip(&second).map(|(a, b)| a | b).collect();
+        let share = both.iter().filter(|&&m| m).count() as f32 / CELLS as f32;
+        if clear && second.contains(&true) && share <= SHARE.1 {
+            return both;
+        }
+    }
+    first
+}
+
+fn cells() -> impl Iterator<Item = Place> {
+    (0..CELLS).map(|k| [(k % SIDE) as f32 + 0.5, (k / SIDE) as f32 + 0.5])
+}
+
+fn disk(middle: Place, inner: f32, outer: f32) -> Vec<bool> {
+    cells()
+        .map(|[x, y]| {
+            let r = (x - middle[0]).hypot(y - middle[1]);
+            r >= inner && r < outer
+        })
+        .collect()
+}
+
+/// Star-shaped: the radius is a random Fourier series of the angle, rough or smooth.
+fn blob(middle: Place, radius: f32, rng: &mut impl Rng) -> Vec<bool> {
+    let rough = rng.random_range(0.1..0.5);
+    let fall = rng.random_range(0.8..1.5f32);
+    let waves: Vec<[f32; 2]> = (1..10)
+        .map(|k| {
+            [
+                rough * rng.random_range(-1.0..1.0) / (k as f32).powf(fall),
+                rng.random_range(0.0..TAU),
+            ]
+        })
+        .collect();
+    cells()
+        .map(|[x, y]| {
+            let (dx, dy) = (x - middle[0], y - middle[1]);
+            let angle = dy.atan2(dx);
+            let wave: f32 = waves
+                .iter()
+                .enumerate()
+                .map(|(k, w)| w[0] * ((k + 1) as f32 * angle + w[1]).cos())
+                .sum();
+            dx.hypot(dy) < radius * (1.0 + wave).max(0.3)
+        })
+        .collect()
+}
+
+/// A bent line of varying width, `length` cells long before clipping.
+fn tear(middle: Place, length: f32, rng: &mut impl Rng) -> Vec<bool> {
+    let width = rng.random_range(2.5..7.0);
+    let ragged = rng.random_range(0.0..0.35);
+    let mut heading = rng.random_range(0.0..TAU);
+    let bend = rng.random_range(-1.2..1.2) / length;
+    let (steps, phase) = (length.ceil() as usize * 2, rng.random_range(0.0..TAU));
+    let mut course: Vec<(Place, f32)> = Vec::with_capacity(steps);
+    let mut at = [0.0f32, 0.0];
+    for n in 0..steps {
+        let t = (n as f32 + 0.5) / steps as f32;
+        heading += 0.5 * bend + rng.random_range(-1.0..1.0) * ragged * 0.3;
+        at = [at[0] + 0.5 * heading.cos(), at[1] + 0.5 * heading.sin()];
+        let taper = (PI * t).sin().sqrt() * (1.0 + 0.3 * (9.0 * t + phase).sin());
+        course.push((
+            at,
+            (width * taper * (1.0 + rng.random_range(-1.0..1.0) * ragged)).max(0.8),
+        ));
+    }
+    let half = course[steps / 2].0;
+    cells()
+        .map(|[x, y]| {
+            let (x, y) = (x - middle[0] + half[0], y - middle[1] + half[1]);
+            course
+                .iter()
+                .any(|(p, w)| (x - p[0]).powi(2) + (y - p[1]).powi(2) < w * w)
+        })
+        .collect()
+}
+
+/// Invasion percolation: from the middle outwards, always the neighbour with the least of a random field that rises with the radius.
+fn percolation(middle: Place, radius: f32, rng: &mut impl Rng) -> Vec<bool> {
+    let mut field: Vec<f32> = (0..CELLS).map(|_| rng.random_range(0.0..1.0)).collect();
+    let rounds = rng.random_range(0..4);
+    for _ in 0..rounds {
+        field = blurred(&field);
+    }
+    // blurring narrows the field; widen it again so that its roughness keeps its weight against the radius
+    let weight = rng.random_range(0.5..1.6) * [1.0, 3.0, 4.5, 6.0][rounds];
+    let target = (rng.random_range(0.45..0.9) * PI * radius * radius) as usize;
+    let value = |k: usize| {
+        let [dx, dy] = [
+            (k % SIDE) as f32 + 0.5 - middle[0],
+            (k / SIDE) as f32 + 0.5 - middle[1],
+        ];
+        weight * field[k] + (dx * dx + dy * dy) / (radius * radius)
+    };
+    let start = middle[1] as usize * SIDE + middle[0] as usize;
+    let mut mask = vec![false; CELLS];
+    let mut seen = vec![false; CELLS];
+    let mut front = BinaryHeap::from([Front(value(start), start)]);
+    seen[start] = true;
+    let mut taken = 0;
+    while let Some(Front(_, k)) = front.pop() {
+        mask[k] = true;
+        taken += 1;
+        if taken >= target {
+            break;
+        }
+        for n in around(k) {
+            if !seen[n] {
+                seen[n] = true;
+                front.push(Front(value(n), n));
+            }
+        }
+    }
+    mask
+}
+
+/// A cell waiting to be invaded; the least value comes first.
+#[derive(PartialEq)]
+struct Front(f32, usize);
+
+impl Eq for Front {}
+impl Ord for Front {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.0.total_cmp(&self.0).then(other.1.cmp(&self.1))
+    }
+}
+impl PartialOrd for Front {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+fn blurred(field: &[f32]) -> Vec<f32> {
+    (0..CELLS)
+        .map(|k| {
+            let (sum, count) = around(k).fold((field[k], 1.0), |(s, c), n| (s + field[n], c + 1.0));
+            sum / count
+        })
+        .collect()
+}
+
+/// The up to four neighbours of a cell.
+fn around(k: usize) -> impl Iterator<Item = usize> {
+    let (i, j) = (k % SIDE, k / SIDE);
+    let left = (i > 0).then(|| k - 1);
+    let right = (i + 1 < SIDE).then_some(k + 1);
+    let below = (j > 0).then(|| k - SIDE);
+    let above = (j + 1 < SIDE).then_some(k + SIDE);
+    [left, right, below, above].into_iter().flatten()
+}
+
+fn clear_border(mut mask: Vec<bool>) -> Vec<bool> {
+    let inside = MARGIN..SIDE - MARGIN;
+    for (k, m) in mask.iter_mut().enumerate() {
+        *m &= inside.contains(&(k % SIDE)) && inside.contains(&(k / SIDE));
+    }
+    mask
+}
+
+/// All 4-connected pieces of the cells with the given flag, each as a list of cells.
+pub fn pieces(mask: &[bool], flag: bool) -> Vec<Vec<usize>> {
+    let mut seen = vec![false; CELLS];
+    let mut found = Vec::new();
+    for start in 0..CELLS {
+        if mask[start] != flag || seen[start] {
+            continue;
+        }
+        seen[start] = true;
+        let mut piece = vec![start];
+        let mut next = 0;
+        while next < piece.len() {
+            for n in around(piece[next]) {
+                if mask[n] == flag && !seen[n] {
+                    seen[n] = true;
+                    piece.push(n);
+                }
+            }
+            next += 1;
+        }
+        found.push(piece);
+    }
+    found
+}
+
+fn largest_piece(mask: Vec<bool>) -> Vec<bool> {
+    let mut kept = vec![false; CELLS];
+    let largest = pieces(&mask, true)
+        .into_iter()
+        .max_by_key(Vec::len)
+        .unwrap_or_default();
+    for k in largest {
+        kept[k] = true;
+    }
+    kept
+}
+
+/// Cloth cut off inside a hole belongs to the hole.
+fn fill_islands(mut mask: Vec<bool>) -> Vec<bool> {
+    for piece in pieces(&mask, false) {
+        if !piece.contains(&0) {
+            for k in piece {
+                mask[k] = true;
+            }
+        }
+    }
+    mask
+}
+
+/// Distance of every cell's centre from the nearest cell of the mask, in cells; exact, by columns and then rows.
+pub fn distance(mask: &[bool]) -> Vec<f32> {
+    const FAR: f32 = 4.0 * SIDE as f32;
+    let mut column = vec![FAR; CELLS];
+    for i in 0..SIDE {
+        let mut away = FAR;
+        for j in 0..SIDE {
+            away = if mask[j * SIDE + i] { 0.0 } else { away + 1.0 };
+            column[j * SIDE + i] = away.min(FAR);
+        }
+        away = FAR;
+        for j in (0..SIDE).rev() {
+            away = if mask[j * SIDE + i] { 0.0 } else { away + 1.0 };
+            column[j * SIDE + i] = column[j * SIDE + i].min(away);
+        }
+    }
+    let mut all = Vec::with_capacity(CELLS);
+    for row in column.chunks_exact(SIDE) {
+        for i in 0..SIDE {
+            let near2 = row.iter().enumerate().fold(f32::MAX, |least, (n, &d)| {
+                let across = n as f32 - i as f32;
+                least.min(d * d + across * across)
+            });
+            all.push(near2.sqrt());
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    proptest! {
+        #[test]
+        fn a_hole_is_one_piece_of_fair_size_clear_of_the_border(seed: u64, kind in 0usize..5) {
+            let shape = SHAPES[kind].0;
+            let mask = draw_shape(shape, &mut ChaCha8Rng::seed_from_u64(seed));
+            let share = mask.iter().filter(|&&m| m).count() as f32 / CELLS as f32;
+            prop_assert!((SHARE.0..=SHARE.1).contains(&share), "{share}");
+            let inside = MARGIN..SIDE - MARGIN;
+            for (k, _) in mask.iter().enumerate().filter(|(_, m)| **m) {
+                prop_assert!(inside.contains(&(k % SIDE)) && inside.contains(&(k / SIDE)));
+            }
+            prop_assert_eq!(pieces(&mask, true).len(), 1);
+            prop_assert_eq!(pieces(&mask, false).len(), if shape == Shape::Ring { 2 } else { 1 });
+        }
+
+        #[test]
+        fn distance_is_what_a_search_over_all_cells_finds(seed: u64, cell in 0..CELLS) {
+            let mask = draw(&mut ChaCha8Rng::seed_from_u64(seed));
+            let apart = |k: usize| ((k % SIDE) as f32 - (cell % SIDE) as f32).hypot((k / SIDE) as f32 - (cell / SIDE) as f32);
+            let nearest = (0..CELLS).filter(|&k| mask[k]).map(apart).fold(f32::MAX, f32::min);
+            prop_assert!((distance(&mask)[cell] - nearest).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn the_same_seed_draws_the_same_mask() {
+        let draw_once = || draw(&mut ChaCha8Rng::seed_from_u64(5));
+        assert_eq!(draw_once(), draw_once());
+    }
+
+    #[test]
+    fn shares_of_shapes_add_to_one() {
+        assert!((SHAPES.iter().map(|s| s.1).sum::<f32>() - 1.0).abs() < 1e-6);
+    }
+}

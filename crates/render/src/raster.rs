@@ -1,0 +1,274 @@
+//! The z-buffer: triangles and lines drawn at three by three samples a pixel, a band of rows at a time.
+
+use super::camera::Camera;
+use super::outline::Segment;
+use super::shade::{self, Light, Side};
+use super::{CLOTH, Drawable};
+use darn_geometry::mesh::{TriMesh, Vec3};
+use std::ops::Range;
+
+/// Samples along a pixel's side.
+const SAMPLES: usize = 3;
+
+/// A triangle ready to be drawn.
+#[derive(Debug, Clone)]
+pub(super) struct Triangle {
+    /// Pixel x, pixel y, depth of the corners.
+    corners: [Vec3; 3],
+    /// Corner normals in camera axes, facing the eye.
+    normals: [Vec3; 3],
+    /// Unit vectors from the corners to the eye, camera axes.
+    to_eye: [Vec3; 3],
+    side: Side,
+    base: Light,
+}
+
+/// All faces as the camera sees them; those with a corner too near are left out.
+pub(super) fn triangles(
+    mesh: &TriMesh,
+    faces: &[Drawable],
+    tints: &[[u8; 3]],
+    camera: &Camera,
+) -> Vec<Triangle> {
+    let normals = shade::vertex_normals(mesh, faces);
+    let at = |v: usize| camera.seen(&mesh.positions.get(v).copied().unwrap_or_default());
+    let smooth = |v: usize| camera.turned(normals.get(v).copied().unwrap_or_default());
+    let shown = |face: &Drawable| {
+        let seen = face.vertices.map(at);
+        let [a, b, c] = seen.each_ref().map(|p| camera.projected(p));
+        let flat = shade::unit((seen[1] - seen[0]).cross(&(seen[2] - seen[0])));
+        // Camera axes are left-handed (z into the picture), so this cross product points away from the face's outside.
+        let side = if flat.dot(&seen[0]) >= 0.0 {
+            Side::Front
+        } else {
+            Side::Back
+        };
+        let facing = if side == Side::Front { 1.0 } else { -1.0 };
+        Some(Triangle {
+            corners: [a?, b?, c?],
+            normals: face.vertices.map(|v| smooth(v) * facing),
+            to_eye: seen.map(|p| shade::unit(-p)),
+            side,
+            base: shade::from_srgb(tints.get(face.face).copied().unwrap_or(CLOTH)),
+        })
+    };
+    faces.iter().filter_map(shown).collect()
+}
+
+/// What one band of rows came to: one entry a pixel, row by row.
+#[derive(Debug)]
+pub(super) struct Band {
+    colour: Vec<Light>,
+    depth: Vec<f32>,
+    normal: Vec<[f32; 3]>,
+}
+
+/// The whole picture before occlusion: one entry a pixel, row by row.
+#[derive(Debug)]
+pub(super) struct Pixels {
+    /// Width and height.
+    pub size: [usize; 2],
+    /// Light, samples averaged.
+    pub colour: Vec<Light>,
+    /// Depth at the pixel's centre; infinite where nothing is.
+    pub depth: Vec<f32>,
+    /// Normal at the pixel's centre, camera axes.
+    pub normal: Vec<[f32; 3]>,
+}
+
+impl Pixels {
+    /// The bands, which are in order from the top, as one picture.
+    pub fn joined(bands: Vec<Band>, size: [usize; 2]) -> Self {
+        let mut all = Self {
+            size,
+            colour: Vec::new(),
+            depth: Vec::new(),
+            normal: Vec::new(),
+        };
+        for band in bands {
+            all.colour.extend(band.colour);
+            all.depth.extend(band.depth);
+            all.normal.extend(band.normal);
+        }
+        all
+    }
+}
+
+/// Draws the given rows of a picture of `size` pixels.
+pub(super) fn draw(
+    triangles: &[Triangle],
+    segments: &[Segment],
+    size: [usize; 2],
+    rows: Range<usize>,
+) -> Band {
+    let mut canvas = Canvas::new(size, rows);
+    for triangle in triangles {
+        canvas.fill(triangle);
+    }
+    for segment in segments {
+        canvas.stroke(segment);
+    }
+    canvas.resolved()
+}
+
+/// A band at full sample resolution.
+struct Canvas {
+    /// Samples in a row.
+    width: usize,
+    /// Sample rows of the band, counted from the picture's top.
+    rows: Range<usize>,
+    colour: Vec<Light>,
+    depth: Vec<f32>,
+    normal: Vec<[f32; 3]>,
+}
+
+impl Canvas {
+    fn new(size: [usize; 2], rows: Range<usize>) -> Self {
+        let width = size[0] * SAMPLES;
+        let rows = rows.start * SAMPLES..rows.end * SAMPLES;
+        let count = width * rows.len();
+        let behind = |y: usize| shade::background(y as f32 / (size[1] * SAMPLES) as f32);
+        Self {
+            width,
+            colour: rows
+                .clone()
+                .flat_map(|y| std::iter::repeat_n(behind(y), width))
+                .collect(),
+            depth: vec![f32::INFINITY; count],
+            normal: vec![[0.0; 3]; count],
+            rows,
+        }
+    }
+
+    /// The samples a box of pixel coordinates covers, within the band.
+    fn covered(&self, low: [f64; 2], high: [f64; 2]) -> (Range<usize>, Range<usize>) {
+        let samples = SAMPLES as f64;
+        // `as` saturates, so boxes far outside the picture come out empty.
+        let x = (low[0] * samples).floor().max(0.0) as usize
+            ..((high[0] * samples).ceil().max(0.0) as usize).min(self.width);
+        let y = ((low[1] * samples).floor().max(0.0) as usize).max(self.rows.start)
+            ..((high[1] * samples).ceil().max(0.0) as usize).min(self.rows.end);
+        (x, y)
+    }
+
+    fn fill(&mut self, t: &Triangle) {
+        let [a, b, c] = t.corners.map(|p| [p.x, p.y]);
+        let doubled = cross(a, b, c);
+        if doubled == 0.0 || !doubled.is_finite() {
+            return;
+        }
+        let low = [a[0].min(b[0]).min(c[0]), a[1].min(b[1]).min(c[1])];
+        let high = [a[0].max(b[0]).max(c[0]), a[1].max(b[1]).max(c[1])];
+        let (columns, rows) = self.covered(low, high);
+        let inverse = t.corners.map(|p| 1.0 / p.z);
+        for y in rows {
+            for x in columns.clone() {
+                let p = centre(x, y);
+                let on_screen = [
+                    cross(b, c, p) / doubled,
+                    cross(c, a, p) / doubled,
+                    cross(a, b, p) / doubled,
+                ];
+                if on_screen.iter().any(|&w| w < 0.0) {
+                    continue;
+                }
+                let weight: [f64; 3] = std::array::from_fn(|k| on_screen[k] * inverse[k]);
+                let depth = 1.0 / (weight[0] + weight[1] + weight[2]);
+                let at = (y - self.rows.start) * self.width + x;
+                let nearest = self.depth.get(at).copied().unwrap_or(f32::NEG_INFINITY);
+                if (depth as f32) < nearest {
+                    self.put(at, t, weight.map(|w| w * depth), depth as f32);
+                }
+            }
+        }
+    }
+
+    /// Shades one sample; `weight` are barycentric coordinates on the triangle.
+    fn put(&mut self, at: usize, t: &Triangle, weight: [f64; 3], depth: f32) {
+        let blended = |v: &[Vec3; 3]| {
+            let sum = shade::unit(v[0] * weight[0] + v[1] * weight[1] + v[2] * weight[2]);
+            [sum.x as f32, sum.y as f32, sum.z as f32]
+        };
+        let normal = blended(&t.normals);
+        let light = shade::lit(t.base, normal, blended(&t.to_eye), t.side);
+        if let (Some(c), Some(d), Some(n)) = (
+            self.colour.get_mut(at),
+            self.depth.get_mut(at),
+            self.normal.get_mut(at),
+        ) {
+            (*c, *d, *n) = (light, depth, normal);
+        }
+    }
+
+    fn stroke(&mut self, s: &Segment) {
+        let [a, b] = s.ends.map(|p| [p.x, p.y]);
+        let reach = s.width * 0.5;
+        let low = [a[0].min(b[0]) - reach, a[1].min(b[1]) - reach];
+        let high = [a[0].max(b[0]) + reach, a[1].max(b[1]) + reach];
+        let (columns, rows) = self.covered(low, high);
+        let along = [b[0] - a[0], b[1] - a[1]];
+        let length = along[0] * along[0] + along[1] * along[1];
+        for y in rows {
+            for x in columns.clone() {
+                let p = centre(x, y);
+                let from = [p[0] - a[0], p[1] - a[1]];
+                let part = if length > 0.0 {
+                    ((from[0] * along[0] + from[1] * along[1]) / length).clamp(0.0, 1.0)
+                } else {
+                    0.0
+                };
+                let off = [from[0] - part * along[0], from[1] - part * along[1]];
+                if off[0] * off[0] + off[1] * off[1] > reach * reach {
+                    continue;
+                }
+                let depth = 1.0 / ((1.0 - part) / s.ends[0].z + part / s.ends[1].z);
+                let at = (y - self.rows.start) * self.width + x;
+                if let (Some(c), Some(d)) = (self.colour.get_mut(at), self.depth.get(at))
+                    && depth - s.lift <= f64::from(*d)
+                {
+                    *c = shade::mixed(*c, s.ink, s.alpha);
+                }
+            }
+        }
+    }
+
+    /// Samples averaged to pixels; depth and normal are those of the middle sample.
+    fn resolved(self) -> Band {
+        let across = self.width / SAMPLES;
+        let down = self.rows.len() / SAMPLES;
+        let share = 1.0 / (SAMPLES * SAMPLES) as f32;
+        let mut band = Band {
+            colour: Vec::new(),
+            depth: Vec::new(),
+            normal: Vec::new(),
+        };
+        for (y, x) in (0..down).flat_map(|y| (0..across).map(move |x| (y, x))) {
+            let sample = |j: usize, i: usize| (y * SAMPLES + j) * self.width + x * SAMPLES + i;
+            let mut light = [0.0; 3];
+            for at in (0..SAMPLES * SAMPLES).map(|k| sample(k / SAMPLES, k % SAMPLES)) {
+                let one = self.colour.get(at).copied().unwrap_or_default();
+                light = std::array::from_fn(|c| light[c] + share * one[c].clamp(0.0, 1.0));
+            }
+            let middle = sample(SAMPLES / 2, SAMPLES / 2);
+            band.colour.push(light);
+            band.depth
+                .push(self.depth.get(middle).copied().unwrap_or(f32::INFINITY));
+            band.normal
+                .push(self.normal.get(middle).copied().unwrap_or_default());
+        }
+        band
+    }
+}
+
+/// Centre of a sample in pixel coordinates.
+fn centre(x: usize, y: usize) -> [f64; 2] {
+    [
+        (x as f64 + 0.5) / SAMPLES as f64,
+        (y as f64 + 0.5) / SAMPLES as f64,
+    ]
+}
+
+/// Twice the signed area of a triangle in the picture.
+fn cross(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+}

@@ -1,0 +1,276 @@
+//! Settings: a flag, or a `DARN_*` variable, and nothing else. All are parsed before anything is bound.
+
+use std::{net::SocketAddr, ops::RangeInclusive, time::Duration};
+
+use clap::Args;
+
+use super::telemetry::LogFormat;
+
+/// Most jobs that may wait, and most bodies received at once.
+const MOST_WAITING: usize = 65_536;
+
+/// Serve HTTP and gRPC.
+#[derive(Debug, Clone, Args)]
+pub struct ServeArgs {
+    /// Address to listen on, for HTTP and gRPC alike
+    #[arg(
+        long,
+        env = "DARN_LISTEN",
+        value_name = "ADDRESS",
+        default_value = "127.0.0.1:8080"
+    )]
+    pub listen: SocketAddr,
+
+    /// Address for gRPC alone; left out, gRPC shares the port
+    #[arg(long, env = "DARN_GRPC_LISTEN", value_name = "ADDRESS")]
+    pub grpc_listen: Option<SocketAddr>,
+
+    /// Scans mended at once, at most 1024; left out, two per processor
+    #[arg(long, env = "DARN_WORKERS", value_name = "N", value_parser = workers)]
+    pub workers: Option<usize>,
+
+    /// Scans that may wait for a worker, at most 65536; more are refused with 503
+    #[arg(long, env = "DARN_QUEUE", value_name = "N", default_value = "32", value_parser = queue)]
+    pub queue: usize,
+
+    /// Requests whose bodies are received at once; left out, four times workers and queue together. Bodies take at most this
+    /// plus workers plus queue times the body limit of memory
+    #[arg(long, env = "DARN_UPLOADS", value_name = "N", value_parser = uploads)]
+    pub uploads: Option<usize>,
+
+    /// Longest time a scan may wait and be mended, such as 30s or 500ms
+    #[arg(long, env = "DARN_DEADLINE", value_name = "TIME", default_value = "60s", value_parser = duration)]
+    pub deadline: Duration,
+
+    /// Largest request body, such as 64MiB
+    #[arg(long, env = "DARN_BODY_LIMIT", value_name = "SIZE", default_value = "128MiB", value_parser = size)]
+    pub body_limit: usize,
+
+    /// Longest pause between two pieces of a request; the whole body may take eight times as long. Who takes nothing of an answer, or
+    /// sends no request, for so long is let go
+    #[arg(long, env = "DARN_BODY_TIMEOUT", value_name = "TIME", default_value = "15s", value_parser = duration)]
+    pub body_timeout: Duration,
+
+    /// Longest time a shutdown waits for requests under way
+    #[arg(long, env = "DARN_DRAIN", value_name = "TIME", default_value = "20s", value_parser = duration)]
+    pub drain: Duration,
+
+    /// Time without a request after which a session ends, such as 15m
+    #[arg(long, env = "DARN_SESSION_IDLE", value_name = "TIME", default_value = "15m", value_parser = duration)]
+    pub session_idle: Duration,
+
+    /// Most memory that all sessions together may take; the least recently used ones end first
+    #[arg(long, env = "DARN_SESSION_MEMORY", value_name = "SIZE", default_value = "512MiB", value_parser = size)]
+    pub session_memory: usize,
+
+    /// Origins of web pages that may call the service, such as `https://example.org`; `*` for any
+    #[arg(
+        long,
+        env = "DARN_ALLOW_ORIGIN",
+        value_name = "ORIGIN",
+        value_delimiter = ',',
+        value_parser = origin
+    )]
+    pub allow_origin: Vec<String>,
+
+    /// Which log lines are written, such as info or darn=debug
+    #[arg(long, env = "DARN_LOG", value_name = "FILTER", default_value = "info")]
+    pub log: String,
+
+    /// How log lines look
+    #[arg(
+        long,
+        env = "DARN_LOG_FORMAT",
+        value_name = "FORMAT",
+        default_value = "text"
+    )]
+    pub log_format: LogFormat,
+}
+
+impl ServeArgs {
+    /// Worker threads: as set, else two per processor, as one waits while the shared threads do what can be divided.
+    pub fn workers(&self) -> usize {
+        self.workers.unwrap_or_else(|| {
+            2 * std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+        })
+    }
+
+    /// Bodies received at once: as set, else a few times what is mended and waits.
+    pub fn uploads(&self) -> usize {
+        self.uploads
+            .unwrap_or_else(|| (4 * (self.workers() + self.queue)).min(MOST_WAITING))
+    }
+}
+
+fn workers(text: &str) -> Result<usize, String> {
+    within(text, 1..=1024)
+}
+
+fn queue(text: &str) -> Result<usize, String> {
+    within(text, 0..=MOST_WAITING)
+}
+
+fn uploads(text: &str) -> Result<usize, String> {
+    within(text, 1..=MOST_WAITING)
+}
+
+fn within(text: &str, range: RangeInclusive<usize>) -> Result<usize, String> {
+    match text.parse() {
+        Ok(number) if range.contains(&number) => Ok(number),
+        _ => Err(format!(
+            "must be a whole number from {} to {}",
+            range.start(),
+            range.end()
+        )),
+    }
+}
+
+/// `*`, or scheme://host with an optional port, as a browser writes it: in small letters and without a path.
+fn origin(text: &str) -> Result<String, String> {
+    let text = text.trim();
+    let is_origin = || {
+        let (scheme, host) = text.split_once("://")?;
+        let mut letters = scheme.bytes();
+        let scheme = letters.next()?.is_ascii_alphabetic()
+            && letters.all(|b| b.is_ascii_alphanumeric() || b"+-.".contains(&b));
+        let plain = |b: u8| b.is_ascii_alphanumeric() || b"-._:[]".contains(&b);
+        let (name, port) = match host.rsplit_once(':') {
+            Some((name, port)) if !port.ends_with(']') => (name, Some(port)),
+            _ => (host, None),
+        };
+        let port = port.is_none_or(|port| port.parse::<u16>().is_ok());
+        Some(scheme && port && !name.is_empty() && name.bytes().all(plain))
+    };
+    if text == "*" || is_origin() == Some(true) {
+        Ok(text.to_ascii_lowercase())
+    } else {
+        Err("must be `*` or scheme://host, such as https://example.org, without a path".to_owned())
+    }
+}
+
+/// `64MiB`, `512KiB`, `1GiB` or plain bytes.
+fn size(text: &str) -> Result<usize, String> {
+    let (number, unit) = split(text);
+    let factor: usize = match unit {
+        "" | "B" => 1,
+        "KiB" => 1 << 10,
+        "MiB" => 1 << 20,
+        "GiB" => 1 << 30,
+        _ => return Err("unit must be B, KiB, MiB or GiB".to_owned()),
+    };
+    let number: usize = number
+        .parse()
+        .map_err(|_| "must be a whole number and a unit, such as 64MiB")?;
+    match number.checked_mul(factor) {
+        Some(0) | None => {
+            Err("must be at least 1 byte and at most what memory can address".to_owned())
+        }
+        Some(bytes) => Ok(bytes),
+    }
+}
+
+/// `30s`, `500ms`, `2m`.
+fn duration(text: &str) -> Result<Duration, String> {
+    let (number, unit) = split(text);
+    let milliseconds: u64 = match unit {
+        "ms" => 1,
+        "s" => 1000,
+        "m" => 60_000,
+        _ => return Err("needs a unit: ms, s or m".to_owned()),
+    };
+    let number: u64 = number
+        .parse()
+        .map_err(|_| "must be a whole number and a unit, such as 30s")?;
+    // A year is longer than anything waits, and far from overflowing an instant.
+    match number.checked_mul(milliseconds) {
+        Some(ms @ 1..=31_536_000_000) => Ok(Duration::from_millis(ms)),
+        _ => Err("must be between 1ms and a year".to_owned()),
+    }
+}
+
+fn split(text: &str) -> (&str, &str) {
+    let end = text
+        .find(|c: char| !c.is_ascii_digit())
+        .unwrap_or(text.len());
+    text.split_at(end)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Debug, Parser)]
+    struct Command {
+        #[command(flatten)]
+        serve: ServeArgs,
+    }
+
+    #[test]
+    fn settings_have_units_and_bounds() {
+        assert_eq!(size("64MiB"), Ok(64 << 20));
+        assert_eq!(size("12"), Ok(12));
+        assert_eq!(duration("500ms"), Ok(Duration::from_millis(500)));
+        assert_eq!(duration("2m"), Ok(Duration::from_secs(120)));
+        for bad in ["", "0", "MiB", "1MB", "-1", "99999999999999GiB"] {
+            assert!(size(bad).is_err(), "{bad}");
+        }
+        for bad in ["", "30", "0s", "s", "99999999999m", "18446744073709551615m"] {
+            assert!(duration(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn defaults_parse_and_bad_values_are_named() {
+        let settings = Command::try_parse_from(["darn"]).unwrap().serve;
+        assert_eq!(settings.body_limit, 128 << 20);
+        assert!(settings.workers() >= 1);
+        let error = Command::try_parse_from(["darn", "--workers", "0"])
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("--workers") && error.contains("from 1 to 1024"),
+            "{error}"
+        );
+        for bad in [
+            ["--workers", "1025"],
+            ["--queue", "99999999999999999999"],
+            ["--queue", "65537"],
+            ["--uploads", "0"],
+        ] {
+            assert!(
+                Command::try_parse_from(["darn"].iter().chain(&bad)).is_err(),
+                "{bad:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn origins_are_those_a_browser_sends() {
+        for good in [
+            "*",
+            "https://example.org",
+            "http://localhost:3000",
+            "http://[::1]:80",
+        ] {
+            assert_eq!(origin(good).as_deref(), Ok(good));
+        }
+        assert_eq!(
+            origin("HTTPS://Example.org").as_deref(),
+            Ok("https://example.org")
+        );
+        for bad in [
+            "",
+            "example.org",
+            "https://",
+            "https://:80",
+            "https://example.org/",
+            "https://a b",
+            "https://example.org:port",
+            "://x",
+        ] {
+            assert!(origin(bad).is_err(), "{bad}");
+        }
+    }
+}

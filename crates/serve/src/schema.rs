@@ -1,0 +1,95 @@
+//! JSON schemas of the contract's messages, read off the descriptor their types were generated from.
+
+use prost::Message as _;
+use prost_types::{
+    DescriptorProto, EnumDescriptorProto, FieldDescriptorProto, FileDescriptorProto,
+    FileDescriptorSet,
+    field_descriptor_proto::{Label, Type},
+};
+use serde_json::{Map, Value, json};
+
+use darn_contract::v1;
+
+const PACKAGE: &str = "darn.v1";
+/// Fields with numbers that may not be numbers; JSON has null for those.
+const HAS_GAPS: [&str; 2] = ["map", "map_gradient"];
+/// Places in a `FileDescriptorProto`, by field number: its messages, its enums, and a message's fields.
+const MESSAGES: i32 = 4;
+const ENUMS: i32 = 5;
+const FIELDS: i32 = 2;
+
+/// One schema a message or enum, by its name, in the order of the file. A message that takes part only in gRPC is left out.
+pub(super) fn schemas() -> Map<String, Value> {
+    // Our own build wrote the descriptor; if it could not be read, the committed document would tell.
+    let set = FileDescriptorSet::decode(v1::DESCRIPTORS).unwrap_or_default();
+    let Some(file) = set.file.iter().find(|file| file.package() == PACKAGE) else {
+        return Map::new();
+    };
+    let messages = (0..)
+        .zip(&file.message_type)
+        .filter(|(_, message)| !matches!(message.name(), "ScanChunk" | "InpaintChunk"));
+    let messages =
+        messages.map(|(i, message)| (message.name().to_owned(), object(file, i, message)));
+    let enums = (0..)
+        .zip(&file.enum_type)
+        .map(|(i, e)| (e.name().to_owned(), words(file, i, e)));
+    messages.chain(enums).collect()
+}
+
+fn object(file: &FileDescriptorProto, index: i32, message: &DescriptorProto) -> Value {
+    let properties: Map<String, Value> = (0..)
+        .zip(&message.field)
+        .map(|(i, field)| {
+            let mut schema = property(field);
+            let comment = comment(file, &[MESSAGES, index, FIELDS, i]);
+            if !comment.is_empty() {
+                schema["description"] = comment.into();
+            }
+            (field.json_name().to_owned(), schema)
+        })
+        .collect();
+    json!({
+        "type": "object",
+        "description": comment(file, &[MESSAGES, index]),
+        "properties": properties,
+        "additionalProperties": false,
+    })
+}
+
+fn words(file: &FileDescriptorProto, index: i32, e: &EnumDescriptorProto) -> Value {
+    let values: Vec<&str> = e.value.iter().map(|value| value.name()).collect();
+    json!({ "type": "string", "description": comment(file, &[ENUMS, index]), "enum": values })
+}
+
+fn property(field: &FieldDescriptorProto) -> Value {
+    let one = match field.r#type() {
+        Type::Double if HAS_GAPS.contains(&field.name()) => json!({ "type": ["number", "null"] }),
+        Type::Double | Type::Float => json!({ "type": "number" }),
+        Type::Bool => json!({ "type": "boolean" }),
+        Type::Uint32 | Type::Fixed32 => json!({ "type": "integer", "minimum": 0 }),
+        Type::Int32 | Type::Sint32 | Type::Sfixed32 => json!({ "type": "integer" }),
+        Type::Bytes => json!({ "type": "string", "contentEncoding": "base64" }),
+        Type::Message | Type::Enum => match field.type_name().strip_prefix(".darn.v1.") {
+            Some(name) => json!({ "$ref": format!("#/components/schemas/{name}") }),
+            // The only message used from elsewhere is google.protobuf.ListValue.
+            None => json!({ "type": "array", "items": { "type": "number" } }),
+        },
+        // 64-bit numbers are strings in proto3 JSON.
+        _ => json!({ "type": "string" }),
+    };
+    match field.label() {
+        Label::Repeated => json!({ "type": "array", "items": one }),
+        _ => one,
+    }
+}
+
+fn comment(file: &FileDescriptorProto, path: &[i32]) -> String {
+    (file.source_code_info.iter())
+        .flat_map(|info| &info.location)
+        .find(|location| location.path == path)
+        .map(|location| location.leading_comments())
+        .unwrap_or_default()
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ")
+}

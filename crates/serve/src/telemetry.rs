@@ -1,0 +1,322 @@
+//! Logs, request ids and metrics. Labels are few and fixed: never an id, never a path a caller made up.
+
+use std::{io::IsTerminal, panic, time::Duration};
+
+use axum::http::{HeaderMap, HeaderName};
+use clap::ValueEnum;
+use metrics::{Counter, Gauge, Histogram, Key, Label, Level, Metadata, Recorder as _, Unit};
+use metrics_exporter_prometheus::{
+    BuildError, PrometheusBuilder, PrometheusHandle, PrometheusRecorder,
+};
+use tracing::error;
+use tracing_subscriber::EnvFilter;
+use uuid::Uuid;
+
+use darn_contract::v1;
+
+/// The header that carries a request's id, both ways.
+pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
+
+/// A request's id, in its extensions.
+#[derive(Debug, Clone)]
+pub struct RequestId(pub String);
+
+impl RequestId {
+    /// The caller's own id when it is short and plain, else a new one.
+    pub fn of(headers: &HeaderMap) -> Self {
+        let plain = |id: &&str| {
+            (1..=128).contains(&id.len())
+                && id
+                    .bytes()
+                    .all(|b| b.is_ascii_alphanumeric() || b"-_.".contains(&b))
+        };
+        (headers.get(REQUEST_ID))
+            .and_then(|value| value.to_str().ok())
+            .filter(plain)
+            .map_or_else(
+                || Self(Uuid::new_v4().to_string()),
+                |id| Self(id.to_owned()),
+            )
+    }
+}
+
+/// How log lines look.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum LogFormat {
+    /// For a person.
+    Text,
+    /// One JSON object a line.
+    Json,
+}
+
+/// Starts logging to standard error, once; a panic becomes a log line.
+///
+/// # Errors
+/// A filter that does not parse.
+pub fn start_logging(filter: &str, format: LogFormat) -> Result<(), String> {
+    let filter = EnvFilter::try_new(filter).map_err(|error| error.to_string())?;
+    let lines = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal());
+    let started = match format {
+        LogFormat::Text => lines.try_init(),
+        LogFormat::Json => lines
+            .json()
+            .flatten_event(true)
+            .with_span_list(false)
+            .try_init(),
+    };
+    // Somebody else's subscriber, in a test or an embedding program, is as good.
+    if started.is_ok() {
+        panic::set_hook(Box::new(|info| {
+            let message = info.payload_as_str().unwrap_or("no message");
+            let place = info.location().map(ToString::to_string).unwrap_or_default();
+            error!(message, place, "panicked");
+        }));
+    }
+    Ok(())
+}
+
+/// What the worker pool counts.
+#[derive(Debug)]
+pub struct PoolMetrics {
+    /// Jobs waiting.
+    pub waiting: Gauge,
+    /// Jobs running.
+    pub running: Gauge,
+    /// Seconds a job waited.
+    pub waited: Histogram,
+    /// Jobs dropped before they began: the caller left or the deadline passed.
+    pub skipped: Counter,
+    /// Jobs whose result nobody took.
+    pub discarded: Counter,
+    /// Jobs that panicked.
+    pub panicked: Counter,
+}
+
+impl PoolMetrics {
+    /// Counts nothing.
+    pub fn unwatched() -> Self {
+        Self {
+            waiting: Gauge::noop(),
+            running: Gauge::noop(),
+            waited: Histogram::noop(),
+            skipped: Counter::noop(),
+            discarded: Counter::noop(),
+            panicked: Counter::noop(),
+        }
+    }
+}
+
+/// What the kept sessions count.
+#[derive(Debug)]
+pub struct SessionMetrics {
+    /// Sessions open.
+    pub open: Gauge,
+    /// Bytes they take.
+    pub bytes: Gauge,
+    /// Requests that use one or wait for their turn.
+    pub requests: Gauge,
+    /// Sessions ever opened.
+    pub opened: Counter,
+    /// Ended by idleness.
+    pub expired: Counter,
+    /// Ended for their memory.
+    pub evicted: Counter,
+    /// Ended by their owners.
+    pub deleted: Counter,
+}
+
+impl SessionMetrics {
+    /// Counts nothing.
+    pub fn unwatched() -> Self {
+        Self {
+            open: Gauge::noop(),
+            bytes: Gauge::noop(),
+            requests: Gauge::noop(),
+            opened: Counter::noop(),
+            expired: Counter::noop(),
+            evicted: Counter::noop(),
+            deleted: Counter::noop(),
+        }
+    }
+}
+
+/// The service's metrics; a recorder of its own, so that two services in one process do not mix.
+pub struct Metrics {
+    recorder: PrometheusRecorder,
+    handle: PrometheusHandle,
+}
+
+impl std::fmt::Debug for Metrics {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Metrics").finish_non_exhaustive()
+    }
+}
+
+const BUCKETS: [f64; 15] = [
+    0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0,
+];
+const METADATA: Metadata<'static> = Metadata::new("darn", Level::INFO, None);
+
+impl Metrics {
+    /// An empty set.
+    ///
+    /// # Errors
+    /// Never in practice: the buckets are constant.
+    pub fn new() -> Result<Self, BuildError> {
+        let recorder = PrometheusBuilder::new()
+            .set_buckets(&BUCKETS)?
+            .build_recorder();
+        let seconds = Some(Unit::Seconds);
+        recorder.describe_histogram(
+            "darn_request_seconds".into(),
+            seconds,
+            "time to answer".into(),
+        );
+        recorder.describe_histogram(
+            "darn_stage_seconds".into(),
+            seconds,
+            "time in a stage of mending".into(),
+        );
+        recorder.describe_counter(
+            "darn_requests_total".into(),
+            None,
+            "requests answered".into(),
+        );
+        recorder.describe_counter(
+            "darn_jobs_total".into(),
+            None,
+            "jobs with an unusual end".into(),
+        );
+        recorder.describe_counter(
+            "darn_holes_filled_total".into(),
+            None,
+            "holes filled".into(),
+        );
+        recorder.describe_gauge("darn_jobs".into(), None, "jobs waiting and running".into());
+        recorder.describe_gauge("darn_sessions".into(), None, "sessions open".into());
+        recorder.describe_gauge(
+            "darn_session_bytes".into(),
+            Some(Unit::Bytes),
+            "bytes that open sessions take".into(),
+        );
+        recorder.describe_gauge(
+            "darn_session_requests".into(),
+            None,
+            "requests that use a session or wait for their turn".into(),
+        );
+        recorder.describe_counter(
+            "darn_sessions_opened_total".into(),
+            None,
+            "sessions opened".into(),
+        );
+        recorder.describe_counter(
+            "darn_sessions_ended_total".into(),
+            None,
+            "sessions ended, by reason".into(),
+        );
+        let handle = recorder.handle();
+        Ok(Self { recorder, handle })
+    }
+
+    /// The handles the worker pool counts with.
+    pub fn pool(&self) -> PoolMetrics {
+        PoolMetrics {
+            waiting: self.gauge("darn_jobs", "state", "waiting"),
+            running: self.gauge("darn_jobs", "state", "running"),
+            waited: self.histogram("darn_stage_seconds", "stage", "queue"),
+            skipped: self.counter("darn_jobs_total", vec![Label::new("end", "skipped")]),
+            discarded: self.counter("darn_jobs_total", vec![Label::new("end", "discarded")]),
+            panicked: self.counter("darn_jobs_total", vec![Label::new("end", "panicked")]),
+        }
+    }
+
+    /// The handles the kept sessions count with.
+    pub fn sessions(&self) -> SessionMetrics {
+        let ended = |reason: &str| {
+            let labels = vec![Label::new("reason", reason.to_owned())];
+            self.counter("darn_sessions_ended_total", labels)
+        };
+        let gauge = |name| (self.recorder).register_gauge(&Key::from_name(name), &METADATA);
+        SessionMetrics {
+            open: gauge("darn_sessions"),
+            bytes: gauge("darn_session_bytes"),
+            requests: gauge("darn_session_requests"),
+            opened: self.counter("darn_sessions_opened_total", Vec::new()),
+            expired: ended("idle"),
+            evicted: ended("evicted"),
+            deleted: ended("deleted"),
+        }
+    }
+
+    /// Counts an answer; `route` is the route's pattern, not the caller's path.
+    pub fn answered(&self, route: &str, status: u16, took: Duration) {
+        let labels = vec![
+            Label::new("route", route.to_owned()),
+            Label::new("status", status.to_string()),
+        ];
+        self.counter("darn_requests_total", labels).increment(1);
+        self.histogram("darn_request_seconds", "route", route)
+            .record(took.as_secs_f64());
+    }
+
+    /// Counts the stages of a mend.
+    pub fn mended(&self, report: &v1::Report) {
+        self.counter("darn_holes_filled_total", Vec::new())
+            .increment(report.holes.len() as u64);
+        if let Some(t) = &report.timings {
+            self.stages(&[
+                ("read", t.read),
+                ("weld", t.weld),
+                ("loops", t.loops),
+                ("holes", t.holes),
+                ("write", t.write),
+                ("total", t.total),
+            ]);
+        }
+        for t in report.holes.iter().filter_map(|hole| hole.timings.as_ref()) {
+            self.stages(&[
+                ("region", t.region),
+                ("flatten", t.flatten),
+                ("raster", t.raster),
+                ("net", t.net),
+                ("patch", t.patch),
+                ("report", t.report),
+            ]);
+        }
+    }
+
+    fn stages(&self, milliseconds: &[(&str, f64)]) {
+        for (stage, ms) in milliseconds {
+            self.histogram("darn_stage_seconds", "stage", stage)
+                .record(ms / 1000.0);
+        }
+    }
+
+    /// The Prometheus text.
+    pub fn render(&self) -> String {
+        self.handle.render()
+    }
+
+    /// Folds recorded samples into their buckets; without it they pile up when nobody scrapes.
+    pub fn upkeep(&self) {
+        self.handle.run_upkeep();
+    }
+
+    fn counter(&self, name: &'static str, labels: Vec<Label>) -> Counter {
+        self.recorder
+            .register_counter(&Key::from_parts(name, labels), &METADATA)
+    }
+
+    fn gauge(&self, name: &'static str, label: &'static str, value: &str) -> Gauge {
+        let key = Key::from_parts(name, vec![Label::new(label, value.to_owned())]);
+        self.recorder.register_gauge(&key, &METADATA)
+    }
+
+    fn histogram(&self, name: &'static str, label: &'static str, value: &str) -> Histogram {
+        let key = Key::from_parts(name, vec![Label::new(label, value.to_owned())]);
+        self.recorder.register_histogram(&key, &METADATA)
+    }
+}

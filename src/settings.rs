@@ -1,0 +1,106 @@
+//! Settings of commands: which weights, what computes, and what a scan may cost. The service's own are in `darn-serve`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use darn_gltf_scan::Limits;
+use darn_serve::ServeArgs;
+
+/// Serve HTTP and gRPC.
+#[derive(Debug, Clone, Args)]
+pub struct ServeCommand {
+    /// What the service itself reads.
+    #[command(flatten)]
+    pub serve: ServeArgs,
+
+    /// Threads that all workers share for what can be divided (a mend's copies of a grid, its holes), at most 1024; left out, one per
+    /// processor
+    #[arg(long, env = "DARN_THREADS", value_name = "N", value_parser = threads)]
+    pub threads: Option<usize>,
+
+    /// Most triangles a scan may have
+    #[arg(long, env = "DARN_MAX_FACES", value_name = "N", default_value = "4000000", value_parser = count)]
+    pub max_faces: usize,
+
+    /// Most vertices a scan may have, as its files count them: one that a texture seam splits counts twice
+    #[arg(long, env = "DARN_MAX_VERTICES", value_name = "N", default_value = "2000000", value_parser = count)]
+    pub max_vertices: usize,
+
+    #[command(flatten)]
+    pub network: NetworkArgs,
+}
+
+impl ServeCommand {
+    /// What a scan may cost.
+    pub fn scan_limits(&self) -> Limits {
+        Limits {
+            max_faces: self.max_faces,
+            max_vertices: self.max_vertices,
+            ..Limits::default()
+        }
+    }
+}
+
+/// Which weights, and what computes with them.
+#[derive(Debug, Clone, Args)]
+pub struct NetworkArgs {
+    /// Directory or file of the weights; left out, the shipped ones
+    #[arg(long, env = "DARN_WEIGHTS", value_name = "PATH")]
+    pub weights: Option<PathBuf>,
+
+    /// What runs the network
+    #[arg(
+        long,
+        env = "DARN_BACKEND",
+        value_name = "NAME",
+        default_value = "engine"
+    )]
+    pub backend: Backend,
+
+    /// What differentiates the network in the anchor search: the engine, or burn's autodiff on flex
+    #[arg(
+        long,
+        env = "DARN_AUTODIFF",
+        value_name = "NAME",
+        default_value = "engine"
+    )]
+    pub autodiff: Autodiff,
+}
+
+/// What runs the network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Backend {
+    /// darn's own kernels: the fastest.
+    Engine,
+    /// burn's flex: fast on a processor.
+    #[cfg(feature = "burn")]
+    Flex,
+    /// burn's ndarray: slow, the numerical reference.
+    #[cfg(feature = "burn")]
+    Ndarray,
+}
+
+/// What differentiates the network in the anchor search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Autodiff {
+    /// What runs the network.
+    Engine,
+    /// burn's autodiff on flex.
+    #[cfg(feature = "burn")]
+    Burn,
+}
+
+fn threads(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(number @ 1..=1024) => Ok(number),
+        _ => Err("must be a whole number from 1 to 1024".to_owned()),
+    }
+}
+
+fn count(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(0) => Err("must be at least 1".to_owned()),
+        Ok(count) => Ok(count),
+        Err(_) => Err("must be a whole number".to_owned()),
+    }
+}
