@@ -10,9 +10,9 @@ use darn_geometry::mesh::region::{Region, grow};
 use darn_geometry::mesh::weld::weld;
 use darn_geometry::mesh::{TriMesh, Vec3};
 use darn_geometry::patch;
-use darn_geometry::patch::{Hold, Pull};
+use darn_geometry::patch::{Firmness, Pull};
 use darn_gltf_scan::Scan;
-use darn_net::engine::{Engine, Gradient, Input, Isa, Options, Scratch};
+use darn_net::engine::{Engine, EngineOptions, Gradient, Input, Isa, Scratch};
 use darn_net::weights;
 
 /// The hole of the example scan: its cloth, the cloth laid flat, and that sampled.
@@ -58,7 +58,7 @@ fn mesh(c: &mut Criterion) {
 
 fn cloth(c: &mut Criterion) {
     let hole = hole();
-    let options = patch::Options::default();
+    let options = patch::PatchOptions::default();
     let normal = hole.grid.normalisation().expect("cells are known");
     let positions = hole.grid.normalised(&normal).positions;
     let known = &hole.grid.known;
@@ -82,7 +82,7 @@ fn cloth(c: &mut Criterion) {
     let pull = Pull {
         at: middle,
         to: free.at(middle) + Vec3::new(0.0, 0.02, 0.0),
-        hold: Hold::Soft,
+        hold: Firmness::Soft,
     };
     c.bench_function("patch, one pull", |b| b.iter(|| made(&[pull])));
 }
@@ -92,7 +92,7 @@ fn network(c: &mut Criterion) {
         std::fs::read("weights/standard.safetensors").expect("run in the repository's root");
     let (card, tensors) = weights::read(&bytes).expect("the weights are darn's");
     for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
-        let options = Options {
+        let options = EngineOptions {
             isa: Some(isa),
             threads: 1,
         };

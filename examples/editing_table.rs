@@ -17,8 +17,8 @@ use darn_gltf_scan::export::{Fresh, glb};
 use darn_lab::scarffolds::scanned::{Hole, scanned};
 use darn_lab::scarffolds::sheets;
 use darn_lab::scarffolds::sheets::Sheet;
-use darn_mend::{Limits, NetworkMender, Response, ScanSession};
-use darn_net::engine::Options;
+use darn_mend::{MendLimits, NetworkMender, Response, ScanSession};
+use darn_net::engine::EngineOptions;
 use darn_net::{Network, Networks};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -40,14 +40,14 @@ struct Args {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let args = Args::parse();
-    let standard = Network::load(&std::fs::read(&args.weights)?, Options::default())?;
+    let standard = Network::load(&std::fs::read(&args.weights)?, EngineOptions::default())?;
     let mender = Arc::new(NetworkMender {
-        limits: Limits {
+        limits: MendLimits {
             response: match args.response.as_str() {
                 "plain" => Response::Plain,
                 _ => Response::Difference,
             },
-            ..Limits::default()
+            ..MendLimits::default()
         },
         ..NetworkMender::new(Networks::new(standard, Vec::new()))
     });
@@ -132,7 +132,7 @@ impl Case {
             texcoords: &[],
             faces: &mesh.faces,
         };
-        let scan = Scan::read(&glb(&fresh).ok()?, &darn_gltf_scan::Limits::default()).ok()?;
+        let scan = Scan::read(&glb(&fresh).ok()?, &darn_gltf_scan::ScanLimits::default()).ok()?;
         let started = Instant::now();
         let session = ScanSession::open(
             scan,

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use darn_gltf_scan::Limits;
+use darn_gltf_scan::ScanLimits;
 use darn_serve::ServeArgs;
 
 /// Serve HTTP and gRPC.
@@ -32,11 +32,11 @@ pub struct ServeCommand {
 
 impl ServeCommand {
     /// What a scan may cost.
-    pub fn scan_limits(&self) -> Limits {
-        Limits {
+    pub fn scan_limits(&self) -> ScanLimits {
+        ScanLimits {
             max_faces: self.max_faces,
             max_vertices: self.max_vertices,
-            ..Limits::default()
+            ..ScanLimits::default()
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Hostile and broken scans: never a panic, never memory beyond the limits, always an error that names the place.
 
-use darn_gltf_scan::{Limits, Scan, ScanError};
+use darn_gltf_scan::{Scan, ScanError, ScanLimits};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
@@ -63,10 +63,10 @@ fn whole() -> Vec<u8> {
 
 /// Reads, and writes what could be read; what comes out must be readable or refused, never a panic.
 fn survive(bytes: &[u8]) -> Result<(), ScanError> {
-    let limits = Limits {
+    let limits = ScanLimits {
         max_vertices: 10_000,
         max_faces: 10_000,
-        ..Limits::default()
+        ..ScanLimits::default()
     };
     let scan = Scan::read(bytes, &limits)?;
     assert!(

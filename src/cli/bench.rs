@@ -6,10 +6,10 @@ use super::network::mender;
 use crate::settings::NetworkArgs;
 use darn_contract::Constraints;
 use darn_geometry::grid::{CELLS, NormalGrid, SIDE};
-use darn_gltf_scan::{Limits, Scan};
+use darn_gltf_scan::{Scan, ScanLimits};
 #[cfg(feature = "burn")]
 use darn_lab::unet::{BackendKind, load_network};
-use darn_net::engine::{Engine, Gradient, Input, Isa, Options, Scratch};
+use darn_net::engine::{Engine, EngineOptions, Gradient, Input, Isa, Scratch};
 use darn_net::{Averaging, FillRequest, NetError, Network, UnetConfig, weights};
 use serde_json::json;
 use std::path::PathBuf;
@@ -114,7 +114,7 @@ fn net(args: &NetArgs) -> Result<(), Failure> {
         for isa in isas {
             let isa = Some(isa);
             let threads = *threads;
-            let engine = Engine::new(&tensors, &config, Options { isa, threads });
+            let engine = Engine::new(&tensors, &config, EngineOptions { isa, threads });
             engines.push((threads, engine.or_fail("build the engine")?));
         }
     }
@@ -339,7 +339,7 @@ fn mend(args: &MendArgs) -> Result<(), Failure> {
     let mut stages: Vec<(&str, Vec<f64>)> = Vec::new();
     for _ in 0..=args.times {
         let started = Instant::now();
-        let scan = Scan::read(&bytes, &Limits::default()).or_fail(format!("read {name}"))?;
+        let scan = Scan::read(&bytes, &ScanLimits::default()).or_fail(format!("read {name}"))?;
         let read = started.elapsed();
         let mended = darn_mend::mend(&scan, &Constraints::default(), &mender);
         let mut mended = mended.or_fail(format!("mend {name}"))?;

@@ -7,7 +7,7 @@ use super::network::mender;
 use super::progress::Progress;
 use crate::settings::NetworkArgs;
 use darn_geometry::grid::NormalGrid;
-use darn_geometry::patch::Options;
+use darn_geometry::patch::PatchOptions;
 use darn_lab::evaluate::{self, Cut, EvaluateError, Plan, Report, ScanRow, Scanner, Shares};
 use darn_lab::scarffolds::samples::{Sampler, Turning};
 use darn_lab::scarffolds::sheets::{self, Sheet};
@@ -86,7 +86,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let plan = Plan {
         noises: args.noises(),
         seed: args.seed,
-        options: Options::default(),
+        options: PatchOptions::default(),
     };
     let work = cases.len() * plan.noises.len();
     let progress = Progress::counted("samples", work as u64);

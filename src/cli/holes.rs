@@ -3,7 +3,7 @@
 use super::failure::{Failure, OrFail};
 use super::files;
 use darn_contract::v1::{HolesReport, Loop, LoopKind};
-use darn_gltf_scan::{Limits, Scan};
+use darn_gltf_scan::{Scan, ScanLimits};
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -18,7 +18,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let bytes = files::read(&args.scan)?;
     let name = args.scan.display();
-    let scan = Scan::read(&bytes, &Limits::default()).or_fail(format!("read {name}"))?;
+    let scan = Scan::read(&bytes, &ScanLimits::default()).or_fail(format!("read {name}"))?;
     let report = darn_mend::find_holes(&scan);
     if args.json {
         println!(

@@ -8,7 +8,7 @@ use super::progress::Progress;
 use crate::settings::NetworkArgs;
 use darn_contract::v1::{HoleReport, Report};
 use darn_contract::{Constraints, FieldError};
-use darn_gltf_scan::{Limits, Scan};
+use darn_gltf_scan::{Scan, ScanLimits};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -39,7 +39,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     };
     let bytes = files::read(&args.scan)?;
     let started = Instant::now();
-    let scan = Scan::read(&bytes, &Limits::default()).or_fail(format!("read {name}"))?;
+    let scan = Scan::read(&bytes, &ScanLimits::default()).or_fail(format!("read {name}"))?;
     let read = started.elapsed();
     progress.stage("loading weights");
     let mender = mender(&args.network)?;

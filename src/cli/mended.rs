@@ -4,7 +4,7 @@ use darn_contract::Constraints;
 use darn_geometry::mesh::curvature::vertex_normals;
 use darn_geometry::mesh::{TriMesh, Vec3, weld};
 use darn_gltf_scan::export::{Fresh, glb};
-use darn_gltf_scan::{Limits, Scan};
+use darn_gltf_scan::{Scan, ScanLimits};
 use darn_lab::evaluate::EvaluateError;
 use darn_lab::scarffolds::scanned::Scanned;
 use darn_mend::NetworkMender;
@@ -29,7 +29,7 @@ fn through_glb(
         texcoords: &[],
         faces: &scanned.mesh.faces,
     })?;
-    let scan = Scan::read(&bytes, &Limits::default())?;
+    let scan = Scan::read(&bytes, &ScanLimits::default())?;
     // Sheets hang along −z.
     let architecture = mender.networks.default().card().architecture;
     let constraints = Constraints {
@@ -37,6 +37,6 @@ fn through_glb(
         ..Constraints::default()
     };
     let mended = darn_mend::mend(&scan, &constraints, mender)?;
-    let scan = Scan::read(&mended.bytes, &Limits::default())?;
+    let scan = Scan::read(&mended.bytes, &ScanLimits::default())?;
     Ok(weld::weld(&scan.surface).mesh)
 }

@@ -6,7 +6,7 @@ use crate::settings::{Autodiff, Backend, NetworkArgs};
 #[cfg(feature = "burn")]
 use darn_lab::unet::{BackendKind, Settings, load_network};
 use darn_mend::NetworkMender;
-use darn_net::engine::Options;
+use darn_net::engine::EngineOptions;
 use darn_net::{NetError, Network, Networks};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -74,8 +74,8 @@ fn in_directory(path: &Path) -> Result<Vec<PathBuf>, Failure> {
 }
 
 /// Copies of a grid, and places of a search, are divided among all threads; a single grid's layers, too.
-fn options() -> Options {
-    Options {
+fn options() -> EngineOptions {
+    EngineOptions {
         isa: None,
         threads: rayon::current_num_threads(),
     }

@@ -6,7 +6,7 @@ use super::network::mender;
 use super::progress::Progress;
 use crate::settings::NetworkArgs;
 use darn_contract::Search;
-use darn_gltf_scan::{Limits, Scan};
+use darn_gltf_scan::{Scan, ScanLimits};
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -40,7 +40,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let progress = Progress::staged("darn");
     progress.stage("reading");
     let bytes = files::read(&args.scan)?;
-    let scan = Scan::read(&bytes, &Limits::default()).or_fail(format!("read {name}"))?;
+    let scan = Scan::read(&bytes, &ScanLimits::default()).or_fail(format!("read {name}"))?;
     progress.stage("loading weights");
     let mender = mender(&args.network)?;
     progress.stage("searching");

@@ -3,7 +3,7 @@
 use super::failure::{Failure, OrFail};
 use super::files;
 use darn_geometry::mesh::{Vec3, weld};
-use darn_gltf_scan::{Limits, Scan};
+use darn_gltf_scan::{Scan, ScanLimits};
 use darn_render::{Aim, CLOTH, Framing, Lines, MAX_SIDE, MENDED, View, picture};
 use image::ImageFormat;
 use std::io::Cursor;
@@ -32,8 +32,8 @@ pub struct Args {
 
 pub fn run(args: &Args) -> Result<(), Failure> {
     let bytes = files::read(&args.scan)?;
-    let scan =
-        Scan::read(&bytes, &Limits::default()).or_fail(format!("read {}", args.scan.display()))?;
+    let scan = Scan::read(&bytes, &ScanLimits::default())
+        .or_fail(format!("read {}", args.scan.display()))?;
     let welded = weld::weld(&scan.surface);
     let tints: Vec<[u8; 3]> = welded
         .face_of

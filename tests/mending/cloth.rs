@@ -14,7 +14,7 @@ use darn_gltf_scan::export::{Fresh, glb};
 use darn_lab::scarffolds::scanned::{Hole, Scanned, scanned};
 use darn_lab::scarffolds::sheets::{self, Sheet};
 use darn_mend::{MendError, NetworkMender, mend};
-use darn_net::engine::Options;
+use darn_net::engine::EngineOptions;
 use darn_net::{Network, Networks};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -30,7 +30,7 @@ pub const ROUND: Hole = Hole::Circle {
 
 /// A network that ships.
 pub fn network(weights: &[u8]) -> Network {
-    Network::load(weights, Options::default()).expect("the shipped weights load")
+    Network::load(weights, EngineOptions::default()).expect("the shipped weights load")
 }
 
 /// The mender, loaded once for all tests.
@@ -80,7 +80,7 @@ pub fn packed(mesh: &TriMesh, texcoords: &[[f32; 2]]) -> Vec<u8> {
 }
 
 pub fn read(bytes: &[u8]) -> Scan {
-    Scan::read(bytes, &darn_gltf_scan::Limits::default()).expect("a readable scan")
+    Scan::read(bytes, &darn_gltf_scan::ScanLimits::default()).expect("a readable scan")
 }
 
 pub fn mended(bytes: &[u8], constraints: &Constraints) -> Result<Mended, MendError> {

@@ -7,7 +7,7 @@ use darn_contract::{Anchor, Constraints, Edit, Gesture, HoleSelector};
 use darn_geometry::mesh::intersect::intersections_with;
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
 use darn_lab::scarffolds::scanned::Hole;
-use darn_mend::{Call, Limits, MendError, NetworkMender, mend};
+use darn_mend::{Call, MendError, MendLimits, NetworkMender, mend};
 use darn_net::Networks;
 
 use super::cloth::{
@@ -225,9 +225,9 @@ fn cloth_with_a_triangle_for_either_side_gets_a_patch_with_both() {
 #[test]
 fn more_holes_than_are_filled_at_once_are_refused() {
     let mender = NetworkMender {
-        limits: Limits {
+        limits: MendLimits {
             holes: 1,
-            ..Limits::default()
+            ..MendLimits::default()
         },
         ..NetworkMender::new(Networks::new(network(WEIGHTS), Vec::new()))
     };

@@ -10,7 +10,7 @@ use super::buffers::Document;
 use super::json::Place;
 use super::read::within;
 use super::skin::{Influence, Influences};
-use super::{Limits, ScanError};
+use super::{ScanError, ScanLimits};
 
 type Uvs = Arc<[[f32; 2]]>;
 type Rgba = Arc<[[f32; 4]]>;
@@ -18,7 +18,7 @@ type Rgba = Arc<[[f32; 4]]>;
 /// Decodes vertex attributes, each accessor once: primitives and instances share them.
 pub(super) struct Attributes<'d, 'a> {
     document: &'d Document<'a>,
-    limits: &'d Limits,
+    limits: &'d ScanLimits,
     /// By accessor.
     texcoords: HashMap<usize, Uvs>,
     colors: HashMap<usize, (Type, Rgba)>,
@@ -29,7 +29,7 @@ pub(super) struct Attributes<'d, 'a> {
 }
 
 impl<'d, 'a> Attributes<'d, 'a> {
-    pub fn new(document: &'d Document<'a>, limits: &'d Limits) -> Self {
+    pub fn new(document: &'d Document<'a>, limits: &'d ScanLimits) -> Self {
         Self {
             document,
             limits,

@@ -68,7 +68,7 @@ pub enum ScanError {
     Limit {
         /// JSON pointer to the place that goes over.
         pointer: String,
-        /// The limit's name, a field of [`super::Limits`].
+        /// The limit's name, a field of [`super::ScanLimits`].
         limit: &'static str,
         /// The limit's value.
         allowed: usize,

@@ -127,7 +127,7 @@ fn bytes_of<const N: usize>(rows: &[[f32; N]]) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Limits, Scan};
+    use super::super::{Scan, ScanLimits};
     use super::*;
 
     #[test]
@@ -140,7 +140,7 @@ mod tests {
             texcoords: &[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]],
             faces: &[[0, 1, 2]],
         };
-        let scan = Scan::read(&glb(&fresh).unwrap(), &Limits::default()).unwrap();
+        let scan = Scan::read(&glb(&fresh).unwrap(), &ScanLimits::default()).unwrap();
         assert_eq!(scan.surface.faces, [[0, 1, 2]]);
         assert_eq!(
             scan.surface.positions[2],
@@ -161,7 +161,7 @@ mod tests {
             faces: &[[0, 1, 2]],
         };
         let bytes = meshes(&[fresh("one"), fresh("two")]).unwrap();
-        let scan = Scan::read(&bytes, &Limits::default()).unwrap();
+        let scan = Scan::read(&bytes, &ScanLimits::default()).unwrap();
         assert_eq!(scan.surface.faces.len(), 2);
         assert_eq!(scan.mesh_name(1), Some("two"));
     }

@@ -44,7 +44,7 @@ use skin::{Influence, Influences};
 
 /// What a scan may cost. Every refusal names the field and its value.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Limits {
+pub struct ScanLimits {
     /// Vertices of all drawn primitives together, instances counted.
     pub max_vertices: usize,
     /// Triangles of all drawn primitives together, instances counted, degenerate ones too.
@@ -61,7 +61,7 @@ pub struct Limits {
     pub max_json_values: usize,
 }
 
-impl Default for Limits {
+impl Default for ScanLimits {
     fn default() -> Self {
         Self {
             max_vertices: 2_000_000,
@@ -142,7 +142,7 @@ impl Scan {
     ///
     /// # Errors
     /// See [`ScanError`]; a scan that draws no triangle is [`ScanError::NoTriangles`].
-    pub fn read(bytes: &[u8], limits: &Limits) -> Result<Self, ScanError> {
+    pub fn read(bytes: &[u8], limits: &ScanLimits) -> Result<Self, ScanError> {
         read::read(bytes, limits)
     }
 

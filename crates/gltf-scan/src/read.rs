@@ -13,13 +13,13 @@ use super::json::{Place, values_at_most};
 use super::scene::{Drawn, drawn};
 use super::skin::skinned_meshes;
 use super::triangles::Runs;
-use super::{Block, Limits, Part, Scan, ScanError};
+use super::{Block, Part, Scan, ScanError, ScanLimits};
 use darn_geometry::mesh::{TriMesh, Vec3};
 
 const DRACO: &str = "KHR_draco_mesh_compression";
 const QUANTIZED: &str = "KHR_mesh_quantization";
 
-pub(super) fn read(bytes: &[u8], limits: &Limits) -> Result<Scan, ScanError> {
+pub(super) fn read(bytes: &[u8], limits: &ScanLimits) -> Result<Scan, ScanError> {
     let layout = super::container::layout(bytes)?;
     let text = bytes.get(layout.json.clone()).unwrap_or_default();
     within(
@@ -105,7 +105,7 @@ pub(super) fn within(
 
 struct Reader<'d, 'a> {
     document: &'d Document<'a>,
-    limits: &'d Limits,
+    limits: &'d ScanLimits,
     surface: TriMesh,
     parts: Vec<Part>,
     blocks: Vec<Block>,
@@ -117,7 +117,7 @@ struct Reader<'d, 'a> {
 }
 
 impl<'d, 'a> Reader<'d, 'a> {
-    fn new(document: &'d Document<'a>, limits: &'d Limits) -> Self {
+    fn new(document: &'d Document<'a>, limits: &'d ScanLimits) -> Self {
         Self {
             document,
             limits,

@@ -5,11 +5,11 @@ use serde_json::{Value, json};
 
 use super::skin::Influence;
 use super::testing::Builder;
-use super::{Container, Limits, Scan, ScanError};
+use super::{Container, Scan, ScanError, ScanLimits};
 use darn_geometry::mesh::Vec3;
 
 fn read(bytes: &[u8]) -> Result<Scan, ScanError> {
-    Scan::read(bytes, &Limits::default())
+    Scan::read(bytes, &ScanLimits::default())
 }
 
 /// The error of a unit square after an edit of its JSON.
@@ -219,9 +219,9 @@ fn joints_and_weights_that_are_none_are_named() {
         let error = read(&scan.glb()).unwrap_err();
         assert_eq!(error.pointer(), Some(pointer), "{error}");
     }
-    let tight = Limits {
+    let tight = ScanLimits {
         max_attribute_values: 31,
-        ..Limits::default()
+        ..ScanLimits::default()
     };
     let error = Scan::read(&Builder::skinned().glb(), &tight).unwrap_err();
     assert!(
@@ -398,40 +398,40 @@ fn positions_that_are_not_finite_and_indices_out_of_range_are_named() {
 #[test]
 fn limits_are_named_with_their_value() {
     let glb = Builder::square().glb();
-    let tight = |limits: Limits| Scan::read(&glb, &limits).unwrap_err().to_string();
-    let all = Limits::default();
+    let tight = |limits: ScanLimits| Scan::read(&glb, &limits).unwrap_err().to_string();
+    let all = ScanLimits::default();
     for (text, limits) in [
         (
             "max_vertices = 3",
-            Limits {
+            ScanLimits {
                 max_vertices: 3,
                 ..all.clone()
             },
         ),
         (
             "max_faces = 1",
-            Limits {
+            ScanLimits {
                 max_faces: 1,
                 ..all.clone()
             },
         ),
         (
             "max_nodes = 0",
-            Limits {
+            ScanLimits {
                 max_nodes: 0,
                 ..all.clone()
             },
         ),
         (
             "max_primitives = 0",
-            Limits {
+            ScanLimits {
                 max_primitives: 0,
                 ..all.clone()
             },
         ),
         (
             "max_json_values = 10",
-            Limits {
+            ScanLimits {
                 max_json_values: 10,
                 ..all.clone()
             },

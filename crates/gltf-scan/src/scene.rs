@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion};
 
 use super::json::Place;
-use super::{Limits, ScanError};
+use super::{ScanError, ScanLimits};
 use darn_geometry::mesh::Vec3;
 
 /// An affine map, accumulated in f64: x ↦ `linear` x + `offset`.
@@ -68,7 +68,7 @@ impl Placement {
 ///
 /// Without `scene` the first scene is taken, without scenes every node that is nobody's child. Skins are not applied: a skinned
 /// mesh stands in its bind pose, as stored, untouched by its node's transform; morph targets likewise have weight 0.
-pub(super) fn drawn(root: &Place<'_>, limits: &Limits) -> Result<Vec<Drawn>, ScanError> {
+pub(super) fn drawn(root: &Place<'_>, limits: &ScanLimits) -> Result<Vec<Drawn>, ScanError> {
     let nodes = match root.get("nodes")? {
         Some(nodes) => nodes.array()?.len(),
         None => return Ok(Vec::new()),

@@ -5,11 +5,11 @@ use serde_json::{Value, json};
 
 use super::skin::Influence;
 use super::testing::Builder;
-use super::{Addition, Limits, PatchPoint, Scan, ScanError};
+use super::{Addition, PatchPoint, Scan, ScanError, ScanLimits};
 use darn_geometry::mesh::Vec3;
 
 fn read(bytes: &[u8]) -> Scan {
-    Scan::read(bytes, &Limits::default()).unwrap()
+    Scan::read(bytes, &ScanLimits::default()).unwrap()
 }
 
 /// A tent over the first three vertices of a part: one new point, three triangles.

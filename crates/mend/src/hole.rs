@@ -9,7 +9,7 @@ use super::inpainter::Inpainter;
 use super::prepared::{Prepared, Unedited};
 use super::select::Chosen;
 use super::wishes::Wishes;
-use super::{Limits, MendError, fill, milliseconds};
+use super::{MendError, MendLimits, fill, milliseconds};
 use darn_contract::v1;
 use darn_geometry::mesh::Vec3;
 use darn_geometry::mesh::loops::LoopKind;
@@ -49,7 +49,7 @@ pub fn fill<'h: 'c, 'c>(
     prepared: &'h Prepared,
     chosen: &'c Chosen,
     inpainter: &Inpainter,
-    limits: &Limits,
+    limits: &MendLimits,
 ) -> Result<Filled<'h, 'c>, MendError> {
     let unedited = prepared.unedited(inpainter, limits)?;
     let wishes = Wishes::of((prepared, &unedited), chosen, inpainter, limits)?;
@@ -87,7 +87,7 @@ fn drawn(
     (prepared, unedited): (&Prepared, &Unedited),
     moved: &[Vec3],
     pulls: &[Pull],
-    limits: &Limits,
+    limits: &MendLimits,
 ) -> Result<Patch, MendError> {
     let stretch = |patch: &Patch| quality::measure(patch, &prepared.region).stretch_max;
     let usual = stretch(&unedited.patch);

@@ -48,9 +48,9 @@ pub struct NetworkMender {
     /// The networks that predict the cloth.
     pub networks: Networks,
     /// What a mend may cost and look like.
-    pub limits: Limits,
+    pub limits: MendLimits,
     /// What a scan may cost.
-    pub scan_limits: darn_gltf_scan::Limits,
+    pub scan_limits: darn_gltf_scan::ScanLimits,
 }
 
 impl NetworkMender {
@@ -58,36 +58,36 @@ impl NetworkMender {
     pub fn new(networks: Networks) -> NetworkMender {
         NetworkMender {
             networks,
-            limits: Limits::default(),
-            scan_limits: darn_gltf_scan::Limits::default(),
+            limits: MendLimits::default(),
+            scan_limits: darn_gltf_scan::ScanLimits::default(),
         }
     }
 }
 
 /// What a mend may cost and look like.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Limits {
+pub struct MendLimits {
     /// When a chart is refused.
-    pub flatten: flatten::Limits,
+    pub flatten: flatten::FlattenLimits,
     /// How a patch is made.
-    pub patch: patch::Options,
+    pub patch: patch::PatchOptions,
     /// How the network is asked for edited cloth.
     pub response: Response,
     /// How far an anchor search goes.
-    pub search: edit::Options,
+    pub search: edit::SearchOptions,
     /// Cells an anchor search looks at before it sets out.
     pub seeds: usize,
     /// Holes filled at once: each holds its chart, its grid and its patch until the last is done.
     pub holes: usize,
 }
 
-impl Default for Limits {
+impl Default for MendLimits {
     fn default() -> Self {
-        Limits {
-            flatten: flatten::Limits::default(),
-            patch: patch::Options::default(),
+        MendLimits {
+            flatten: flatten::FlattenLimits::default(),
+            patch: patch::PatchOptions::default(),
             response: Response::default(),
-            search: edit::Options::default(),
+            search: edit::SearchOptions::default(),
             seeds: 16,
             holes: 1000,
         }

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use super::cloth::Cloth;
 use super::inpainter::{Inpainter, Voice};
-use super::{Limits, MendError, milliseconds};
+use super::{MendError, MendLimits, milliseconds};
 use crate::edit::{HoleCells, Reach};
 use darn_contract::v1;
 use darn_geometry::flatten::{self, Chart};
@@ -15,7 +15,7 @@ use darn_geometry::mesh::denoise::denoised;
 use darn_geometry::mesh::layers::layers_near;
 use darn_geometry::mesh::region::{self, Region};
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
-use darn_geometry::patch::{self, Patch, PatchError, Plan};
+use darn_geometry::patch::{self, Patch, PatchError, PatchPlan};
 use darn_net::Averaging;
 
 /// How much of the grid's side the hole should take, so that hole and context share it as in training.
@@ -40,7 +40,7 @@ pub struct Prepared {
     /// The same laid flat.
     pub chart: Chart,
     /// How it will be meshed.
-    pub plan: Plan,
+    pub plan: PatchPlan,
     /// What the grid knows of the scan.
     pub grid: Grid,
     /// Brings the grid to the network's units and back.
@@ -77,7 +77,7 @@ pub struct Unedited {
 
 impl Prepared {
     /// Prepares a hole; with smaller and smaller regions when one gives no usable chart, and at last with the scanner's noise.
-    pub fn new(cloth: &Cloth, id: u32, limits: &Limits) -> Result<Prepared, MendError> {
+    pub fn new(cloth: &Cloth, id: u32, limits: &MendLimits) -> Result<Prepared, MendError> {
         let reach = reach_for(extent_at_a_glance(cloth, id));
         without_noise(|smoothed| Self::within((reach, smoothed), cloth, id, limits))
     }
@@ -86,7 +86,7 @@ impl Prepared {
         (mut reach, smoothed): (f64, Smoothing),
         cloth: &Cloth,
         id: u32,
-        limits: &Limits,
+        limits: &MendLimits,
     ) -> Result<Prepared, MendError> {
         let mut tries = 0;
         loop {
@@ -127,7 +127,7 @@ impl Prepared {
     pub fn unedited(
         &self,
         inpainter: &Inpainter,
-        limits: &Limits,
+        limits: &MendLimits,
     ) -> Result<Arc<Unedited>, MendError> {
         // Nothing that is done under the lock can panic half-way.
         let lock = || self.unedited.lock().unwrap_or_else(PoisonError::into_inner);
@@ -147,7 +147,7 @@ impl Prepared {
         Ok(made)
     }
 
-    fn fill(&self, inpainter: &Inpainter, limits: &Limits) -> Result<Unedited, MendError> {
+    fn fill(&self, inpainter: &Inpainter, limits: &MendLimits) -> Result<Unedited, MendError> {
         let started = Instant::now();
         let answers =
             inpainter.fill(std::slice::from_ref(&self.normal_grid()), Averaging::Flips)?;
@@ -185,7 +185,7 @@ impl Prepared {
         &self,
         filled: &[Vec3],
         pulls: &[patch::Pull],
-        limits: &Limits,
+        limits: &MendLimits,
     ) -> Result<Patch, MendError> {
         self.plan
             .patch(&self.chart, filled, pulls, &limits.patch)
@@ -243,7 +243,7 @@ impl Laid {
         cloth: &Cloth,
         hole: u32,
         (reach, smoothed): (f64, Smoothing),
-        limits: &Limits,
+        limits: &MendLimits,
     ) -> Result<Laid, MendError> {
         let laid = Self::with_reach(cloth, hole, (reach, smoothed), limits)?;
         let wanted = reach_for(extent(&laid.rim_uv()) * laid.chart.frame.side);
@@ -265,7 +265,7 @@ impl Laid {
         cloth: &Cloth,
         hole: u32,
         (reach, smoothed): (f64, Smoothing),
-        limits: &Limits,
+        limits: &MendLimits,
     ) -> Result<Laid, MendError> {
         let started = Instant::now();
         let region = region::grow(
@@ -305,7 +305,7 @@ impl Laid {
     }
 
     /// Samples the grid and plans the patch.
-    fn sampled(self, cloth: &Cloth, id: u32, limits: &Limits) -> Result<Prepared, MendError> {
+    fn sampled(self, cloth: &Cloth, id: u32, limits: &MendLimits) -> Result<Prepared, MendError> {
         let seen = self.smooth.as_ref().unwrap_or(&self.region);
         let polygon = self.rim_uv();
         let sample = || {

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use super::inpainter::Inpainter;
 use super::prepared::{Prepared, Unedited};
-use super::{Call, Limits, MendError, milliseconds};
+use super::{Call, MendError, MendLimits, milliseconds};
 use crate::edit::{Found, Landscape, Slope, Step, descend, exhaust, map, nearest_cell, seeds};
 use darn_contract::port::Cancellation;
 use darn_contract::{FieldError, Search, v1};
@@ -81,7 +81,7 @@ pub fn place(
     prepared: &Prepared,
     unedited: &Unedited,
     inpainter: &Inpainter,
-    (position, limits): (Vec3, &Limits),
+    (position, limits): (Vec3, &MendLimits),
 ) -> Result<Vec2, MendError> {
     let losses = Losses::new(prepared, inpainter, position)?;
     let first =
@@ -135,7 +135,7 @@ fn walk(
     prepared: &Prepared,
     losses: &Losses,
     first: usize,
-    limits: &Limits,
+    limits: &MendLimits,
 ) -> Result<Found, MendError> {
     let seeds = seeds(&prepared.cells, first, limits.seeds);
     let found = descend(losses, &prepared.cells, &seeds, &limits.search)?;
@@ -174,7 +174,7 @@ fn chart(
     prepared: &Prepared,
     losses: &Losses,
     found: &Found,
-    (answer, limits): (&mut v1::AnchorFound, &Limits),
+    (answer, limits): (&mut v1::AnchorFound, &MendLimits),
 ) -> Result<(), MendError> {
     let mut slopes: Vec<Option<Slope>> = vec![None; CELLS];
     for cells in prepared.cells.indices().chunks(limits.search.batch.max(1)) {

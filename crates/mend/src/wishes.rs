@@ -3,12 +3,12 @@
 use super::inpainter::Inpainter;
 use super::prepared::{Prepared, Unedited};
 use super::select::Chosen;
-use super::{Limits, MendError, search};
+use super::{MendError, MendLimits, search};
 use crate::edit::{Firmness, Hand, Point, Wanted};
 use darn_contract::{Anchor, FieldError, Gesture, v1};
 use darn_geometry::grid;
 use darn_geometry::mesh::{Vec2, Vec3};
-use darn_geometry::patch::{Hold, Patch, Pull};
+use darn_geometry::patch::{Patch, Pull};
 
 /// A hard anchor is met when the cloth is within this share of the hole's extent of it.
 const MET: f64 = 1e-3;
@@ -39,7 +39,7 @@ impl<'a> Wishes<'a> {
         (prepared, unedited): (&'a Prepared, &Unedited),
         chosen: &'a Chosen,
         inpainter: &Inpainter,
-        limits: &Limits,
+        limits: &MendLimits,
     ) -> Result<Wishes<'a>, MendError> {
         check(prepared, chosen)?;
         let mut anchors = Vec::new();
@@ -114,10 +114,7 @@ impl<'a> Wishes<'a> {
         let pull = |p: &Wanted| Pull {
             at: self.prepared.chart.frame.point(p.uv),
             to: p.position,
-            hold: match p.firmness {
-                Firmness::Hard => Hold::Hard,
-                Firmness::Soft => Hold::Soft,
-            },
+            hold: p.firmness,
         };
         self.points.iter().map(pull).collect()
     }

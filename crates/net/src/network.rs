@@ -43,7 +43,7 @@ impl Network {
     ///
     /// # Errors
     /// Whatever is wrong with the file, by the tensor's name; see [`weights::read`]. An instruction set that this CPU lacks.
-    pub fn load(bytes: &[u8], options: engine::Options) -> Result<Network, NetError> {
+    pub fn load(bytes: &[u8], options: engine::EngineOptions) -> Result<Network, NetError> {
         let (card, tensors) = weights::read(bytes)?;
         weights::check(&card, &tensors)?;
         let runtime = EngineRuntime::new(&tensors, &card.architecture, options)?;

@@ -62,7 +62,7 @@ impl EngineRuntime {
     pub fn new(
         tensors: &NamedTensors,
         config: &UnetConfig,
-        options: engine::Options,
+        options: engine::EngineOptions,
     ) -> Result<EngineRuntime, NetError> {
         Ok(EngineRuntime {
             engine: Engine::new(tensors, config, options)?,

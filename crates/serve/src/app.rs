@@ -31,7 +31,7 @@ pub struct App {
     /// Counts everything.
     pub metrics: Metrics,
     /// What a request may cost.
-    pub limits: Limits,
+    pub limits: RequestLimits,
     /// Web pages that may call, by origin; `*` for any.
     pub allow_origin: Vec<String>,
     /// Scans kept for editing.
@@ -68,7 +68,7 @@ impl Deadline {
 
 /// What a request may cost.
 #[derive(Debug, Clone, Copy)]
-pub struct Limits {
+pub struct RequestLimits {
     /// Waiting and mending together.
     pub deadline: Duration,
     /// Bytes of a body.
@@ -103,7 +103,7 @@ impl App {
         let sessions = Sessions::new(kept, metrics.sessions());
         Ok(Arc::new(Self {
             metrics,
-            limits: Limits {
+            limits: RequestLimits {
                 deadline: settings.deadline,
                 body: settings.body_limit,
                 body_pause: settings.body_timeout,

@@ -11,7 +11,7 @@ use bytes::{Bytes, BytesMut};
 use tokio::time::{Duration, Instant, timeout, timeout_at};
 
 use super::{
-    app::{Limits, Upload},
+    app::{RequestLimits, Upload},
     problem::Fault,
     question::{self, Question},
 };
@@ -67,7 +67,7 @@ pub struct Patience {
 
 impl Patience {
     /// Starts now.
-    pub fn new(limits: &Limits) -> Self {
+    pub fn new(limits: &RequestLimits) -> Self {
         let end = Instant::now() + limits.body_pause * PAUSES;
         Self {
             pause: limits.body_pause,
@@ -103,7 +103,7 @@ enum Envelope {
 pub async fn asked<Q: Question>(
     request: Request,
     upload: Upload,
-    limits: &Limits,
+    limits: &RequestLimits,
 ) -> Result<Asked<Q>, Fault> {
     let (parts, body) = request.into_parts();
     let fits = || {
@@ -137,9 +137,12 @@ pub async fn asked<Q: Question>(
 ///
 /// # Errors
 /// `UnsupportedMediaType`, `ContentEncoding`, `AskedTooLarge`, `BodyTimeout`, `Malformed` or `Invalid`.
-pub async fn question<Q: Question>(request: Request, limits: &Limits) -> Result<Option<Q>, Fault> {
+pub async fn question<Q: Question>(
+    request: Request,
+    limits: &RequestLimits,
+) -> Result<Option<Q>, Fault> {
     let (parts, body) = request.into_parts();
-    let limits = Limits {
+    let limits = RequestLimits {
         body: question::LIMIT,
         ..*limits
     };
@@ -171,7 +174,7 @@ pub async fn question<Q: Question>(request: Request, limits: &Limits) -> Result<
 async fn whole<T>(
     parts: &Parts,
     mut body: Body,
-    limits: &Limits,
+    limits: &RequestLimits,
     fits: impl FnOnce() -> Result<T, Fault>,
 ) -> Result<(T, Bytes), Fault> {
     let read = async {
@@ -190,7 +193,7 @@ async fn whole<T>(
 
 /// Reads an unwanted body on, within bounds and beside the answer, which does not wait for it: a caller that is still
 /// sending would otherwise see a broken connection and not the answer. One that waits to be told to send is just not told.
-pub fn refuse(headers: &HeaderMap, mut body: Body, limits: &Limits) {
+pub fn refuse(headers: &HeaderMap, mut body: Body, limits: &RequestLimits) {
     if headers.contains_key(header::EXPECT) {
         return;
     }
@@ -259,7 +262,7 @@ fn announced(headers: &HeaderMap, limit: usize) -> Result<(), Fault> {
     }
 }
 
-async fn read(body: &mut Body, limits: &Limits) -> Result<Bytes, Fault> {
+async fn read(body: &mut Body, limits: &RequestLimits) -> Result<Bytes, Fault> {
     let patience = Patience::new(limits);
     let mut bytes = BytesMut::new();
     while let Some(piece) = patience.next(piece(body)).await? {

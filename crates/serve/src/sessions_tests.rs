@@ -244,9 +244,13 @@ fn the_result_is_that_of_the_constraints_last_met() {
         ..Constraints::default()
     };
     // Of what nobody waited for, nobody knows.
-    session.patches(&asked, PatchForm::Glb, Cancellation::new(&|| true)).unwrap();
+    session
+        .patches(&asked, PatchForm::Glb, Cancellation::new(&|| true))
+        .unwrap();
     assert_eq!(size(), 0);
-    session.patches(&asked, PatchForm::Glb, Cancellation::NEVER).unwrap();
+    session
+        .patches(&asked, PatchForm::Glb, Cancellation::NEVER)
+        .unwrap();
     assert_eq!(size(), 3);
     assert!(session.bytes() > 3 * size_of::<Anchor>());
 }

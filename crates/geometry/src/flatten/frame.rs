@@ -4,7 +4,7 @@ use crate::mesh::Vec2;
 
 /// A square in the plane of a chart.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
+pub struct UvSquare {
     /// The corner at uv (0, 0).
     pub origin: Vec2,
     /// Unit vector along u; v is this turned left by a quarter.
@@ -16,9 +16,9 @@ pub struct Frame {
 /// Directions tried for the square; a finer search moves the side by less than a tenth of a per cent.
 const DIRECTIONS: usize = 180;
 
-impl Frame {
+impl UvSquare {
     /// The smallest square, over `DIRECTIONS` rotations of a quarter turn, that holds all points; centred on them.
-    pub fn tightest(points: &[Vec2]) -> Frame {
+    pub fn tightest(points: &[Vec2]) -> UvSquare {
         let points = &convex_hull(points)[..];
         let candidates = (0..DIRECTIONS).map(|k| {
             let angle = std::f64::consts::FRAC_PI_2 * k as f64 / DIRECTIONS as f64;
@@ -26,14 +26,14 @@ impl Frame {
         });
         candidates
             .min_by(|a, b| a.side.total_cmp(&b.side))
-            .unwrap_or(Frame {
+            .unwrap_or(UvSquare {
                 origin: Vec2::zeros(),
                 axis: Vec2::x(),
                 side: 1.0,
             })
     }
 
-    fn along(axis: Vec2, points: &[Vec2]) -> Frame {
+    fn along(axis: Vec2, points: &[Vec2]) -> UvSquare {
         let up = Vec2::new(-axis.y, axis.x);
         let (mut low, mut high) = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
         for p in points {
@@ -44,7 +44,7 @@ impl Frame {
         let extent = high - low;
         let side = extent.max();
         let corner = low - (Vec2::repeat(side) - extent) / 2.0;
-        Frame {
+        UvSquare {
             origin: axis * corner.x + up * corner.y,
             axis,
             side,
@@ -96,7 +96,7 @@ mod tests {
             points in prop::collection::vec((-5.0..5.0f64, -5.0..5.0f64), 3..40)
         ) {
             let points: Vec<Vec2> = points.into_iter().map(|(x, y)| Vec2::new(x, y)).collect();
-            let frame = Frame::tightest(&points);
+            let frame = UvSquare::tightest(&points);
             for p in &points {
                 let uv = frame.uv(*p);
                 prop_assert!(uv.min() >= -1e-12 && uv.max() <= 1.0 + 1e-12);
@@ -110,7 +110,7 @@ mod tests {
         let turned: Vec<Vec2> = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)]
             .map(Vec2::from_tuple)
             .to_vec();
-        assert!((Frame::tightest(&turned).side - 2f64.sqrt()).abs() < 1e-9);
+        assert!((UvSquare::tightest(&turned).side - 2f64.sqrt()).abs() < 1e-9);
     }
 
     trait FromTuple {

@@ -9,7 +9,7 @@ mod raster;
 mod transport;
 mod tutte;
 
-pub use frame::Frame;
+pub use frame::UvSquare;
 pub use raster::raster;
 
 use crate::mesh::region::Region;
@@ -17,14 +17,14 @@ use crate::mesh::{TriMesh, Vec2};
 
 /// What a chart may look like before it is refused.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
+pub struct FlattenLimits {
     /// Largest mean over edges of max(r, 1/r), r the stretch of an edge by the chart.
     pub mean_stretch: f64,
 }
 
-impl Default for Limits {
+impl Default for FlattenLimits {
     fn default() -> Self {
-        Limits { mean_stretch: 1.35 }
+        FlattenLimits { mean_stretch: 1.35 }
     }
 }
 
@@ -69,7 +69,7 @@ pub struct Chart {
     /// One point per region vertex, scene units; faces are counter-clockwise.
     pub flat: Vec<Vec2>,
     /// The unit square of uv in the plane of `flat`.
-    pub frame: Frame,
+    pub frame: UvSquare,
     /// Mean over edges of max(r, 1/r), r = flat length ÷ scene length.
     pub stretch_mean: f64,
     /// Maximum of the same.
@@ -94,7 +94,7 @@ impl Chart {
 ///
 /// # Errors
 /// `Singular` for degenerate triangles, `TooStretched` and `Flipped` when the surface is too far from developable.
-pub fn flatten(region: &Region, limits: &Limits) -> Result<Chart, FlattenError> {
+pub fn flatten(region: &Region, limits: &FlattenLimits) -> Result<Chart, FlattenError> {
     let mesh = &region.mesh;
     let rest = RestTriangle::of(mesh);
     let loops: Vec<&[u32]> = std::iter::once(&region.rim)
@@ -125,7 +125,7 @@ pub fn flatten(region: &Region, limits: &Limits) -> Result<Chart, FlattenError> 
             limit: limits.mean_stretch,
         });
     }
-    let frame = Frame::tightest(&flat);
+    let frame = UvSquare::tightest(&flat);
     Ok(Chart {
         flat,
         frame,
@@ -150,7 +150,7 @@ pub fn hole_extent(region: &Region) -> Result<f64, FlattenError> {
     let energy = arap::Energy::of(mesh, &rest)?;
     let start = energy.assemble(&transport::rotations(mesh, &rest))?;
     let (flat, _) = energy.minimise(start, GLANCE)?;
-    let frame = Frame::tightest(&flat);
+    let frame = UvSquare::tightest(&flat);
     let rim = region.rim.iter().map(|v| frame.uv(flat[*v as usize]));
     let nowhere = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
     let (low, high) = rim.fold(nowhere, |(low, high), uv| (low.inf(&uv), high.sup(&uv)));
@@ -289,7 +289,7 @@ mod tests {
         #[test]
         fn rolled_cloth_flattens_to_itself(n in 12usize..32, bend in 0.1..6.0f64) {
             let region = region(n, 0.0, 0, rolled(bend));
-            let chart = flatten(&region, &Limits::default()).expect("a chart");
+            let chart = flatten(&region, &FlattenLimits::default()).expect("a chart");
             prop_assert_eq!(chart.flipped, 0);
             // Chords of the roll are developable, too.
             prop_assert!(chart.stretch_max < 1.01, "{}", chart.stretch_max);

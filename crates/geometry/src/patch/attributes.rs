@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, Matrix3};
 
 use super::harmonic::Extension;
-use super::{Patch, Plan};
+use super::{Patch, PatchPlan};
 use crate::flatten::Chart;
 use crate::mesh::Vec2;
 use crate::mesh::region::Region;
@@ -50,7 +50,7 @@ pub struct Dressed {
 ///
 /// `plan` is the one that the patch was made by.
 pub fn dress(
-    (plan, patch): (&Plan, &Patch),
+    (plan, patch): (&PatchPlan, &Patch),
     region: &Region,
     chart: &Chart,
     columns: &Columns,
@@ -381,12 +381,12 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::flatten::{Limits, flatten};
+    use crate::flatten::{FlattenLimits, flatten};
     use crate::mesh::loops::{LoopKind, boundary_loops};
     use crate::mesh::shapes::{exploded, sheet, together};
     use crate::mesh::weld::weld;
     use crate::mesh::{TriMesh, Vec3, region};
-    use crate::patch::{Options, plan};
+    use crate::patch::{PatchOptions, plan};
 
     /// A wavy sheet with a round hole, and its texture: right of the middle mirrored, on vertices of its own.
     fn two_islands() -> (TriMesh, Vec<Vec<f64>>) {
@@ -406,8 +406,11 @@ mod tests {
         let loops = boundary_loops(&welded.mesh, &topology);
         let hole = loops.iter().position(|l| l.kind == LoopKind::Hole).unwrap();
         let region = region::grow(&welded.mesh, &topology, &loops, hole, f64::INFINITY).unwrap();
-        let chart = flatten(&region, &Limits::default()).unwrap();
-        let (options, filled) = (Options::default(), vec![Vec3::zeros(); crate::grid::CELLS]);
+        let chart = flatten(&region, &FlattenLimits::default()).unwrap();
+        let (options, filled) = (
+            PatchOptions::default(),
+            vec![Vec3::zeros(); crate::grid::CELLS],
+        );
         let plan = plan(&region, &chart, &options).unwrap();
         let patch = plan.patch(&chart, &filled, &[], &options).unwrap();
 

@@ -20,8 +20,8 @@ mod triangulate;
 mod untangle;
 
 pub use cloth::Elastics;
-pub use plan::{Plan, bearable, plan, plan_in};
-pub use pull::{Hold, Pull};
+pub use plan::{PatchPlan, bearable, plan, plan_in};
+pub use pull::{Firmness, Pull};
 pub use triangulate::signed_area;
 
 use crate::flatten::Chart;
@@ -44,16 +44,16 @@ pub enum PatchError {
 
 /// How a patch is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
+pub struct PatchOptions {
     /// Most inner vertices; beyond it the patch is coarser than the scan.
     pub most_vertices: usize,
     /// The energy of strain limiting.
     pub elastics: Elastics,
 }
 
-impl Default for Options {
+impl Default for PatchOptions {
     fn default() -> Self {
-        Options {
+        PatchOptions {
             most_vertices: 20_000,
             elastics: Elastics::default(),
         }
@@ -113,7 +113,7 @@ fn locate(flat: &[Vec2], faces: &[[u32; 3]], p: Vec2) -> Option<(usize, [f64; 3]
     })
 }
 
-/// Meshes the hole of a region with the positions of a filled grid: [`plan`] and [`Plan::patch`] in one, without pulls.
+/// Meshes the hole of a region with the positions of a filled grid: [`plan`] and [`PatchPlan::patch`] in one, without pulls.
 ///
 /// `filled` holds one scene position per cell. Inner vertices are read off it (bicubic), the difference between grid and scan along the
 /// rim is spread harmonically, then the chart's lengths are restored with the rim held, and what crosses is pushed apart.
@@ -124,7 +124,7 @@ pub fn build(
     region: &Region,
     chart: &Chart,
     filled: &[Vec3],
-    options: &Options,
+    options: &PatchOptions,
 ) -> Result<Patch, PatchError> {
     plan(region, chart, options)?.patch(chart, filled, &[], options)
 }

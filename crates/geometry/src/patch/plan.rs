@@ -6,7 +6,7 @@ use super::harmonic::Extension;
 use super::hem::Hem;
 use super::pull::Pull;
 use super::triangulate::Triangulation;
-use super::{Options, Patch, PatchError};
+use super::{Patch, PatchError, PatchOptions};
 
 mod tile;
 mod touch;
@@ -18,7 +18,7 @@ use tile::Places;
 pub use touch::bearable;
 
 /// Everything about a patch that does not depend on what fills the hole; owned, so that a session can keep it.
-pub struct Plan {
+pub struct PatchPlan {
     rim: Vec<u32>,
     /// Positions of the rim.
     own: Vec<Vec3>,
@@ -35,7 +35,11 @@ pub struct Plan {
 ///
 /// # Errors
 /// `RimCrosses` when the chart overlaps itself at the hole, `Singular` when triangles degenerate.
-pub fn plan(region: &Region, chart: &Chart, options: &Options) -> Result<Plan, PatchError> {
+pub fn plan(
+    region: &Region,
+    chart: &Chart,
+    options: &PatchOptions,
+) -> Result<PatchPlan, PatchError> {
     let rim = turned(region);
     let places = Places::of(&at(&rim, &region.mesh), &region.mesh);
     planned(rim, places, (region, chart), options)
@@ -50,8 +54,8 @@ pub fn plan_in(
     scan: &TriMesh,
     region: &Region,
     chart: &Chart,
-    options: &Options,
-) -> Result<Plan, PatchError> {
+    options: &PatchOptions,
+) -> Result<PatchPlan, PatchError> {
     let rim = turned(region);
     let scanned: Vec<u32> = (rim.iter()).map(|v| region.vertices[*v as usize]).collect();
     let places = Places::of(&at(&scanned, scan), scan);
@@ -72,8 +76,8 @@ fn planned(
     rim: Vec<u32>,
     places: Places,
     (region, chart): (&Region, &Chart),
-    options: &Options,
-) -> Result<Plan, PatchError> {
+    options: &PatchOptions,
+) -> Result<PatchPlan, PatchError> {
     let flat: Vec<Vec2> = rim.iter().map(|v| chart.flat[*v as usize]).collect();
     let tiled = tile::tile(flat, places, spacing(region, chart), options.most_vertices)?;
 
@@ -83,7 +87,7 @@ fn planned(
     let hem = Hem::around(&rim, &tiled, region, chart);
     let fabric = Fabric::new(&hem.sheet(), &options.elastics).map_err(|_| singular("strain"))?;
     let surroundings = Surroundings::new(&rim, &tiled, region);
-    Ok(Plan {
+    Ok(PatchPlan {
         rim,
         own,
         shift: None,
@@ -95,13 +99,13 @@ fn planned(
     })
 }
 
-impl Plan {
+impl PatchPlan {
     /// Joins the scan where its vertices really lie, when the region was one without the scanner's noise: the cloth is made without it,
     /// and what the rim is off by is spread harmonically.
     ///
     /// # Errors
     /// `Singular` when triangles degenerate.
-    pub fn joining(mut self, positions: &[Vec3]) -> Result<Plan, PatchError> {
+    pub fn joining(mut self, positions: &[Vec3]) -> Result<PatchPlan, PatchError> {
         let gaps: Vec<[f64; 3]> = (self.rim.iter().zip(&self.own))
             .map(|(v, own)| (positions[*v as usize] - own).into())
             .collect();
@@ -112,7 +116,7 @@ impl Plan {
     }
 
     /// Keeps the cloth from cutting other layers of the scan, too, not only its region.
-    pub fn among(mut self, others: &TriMesh) -> Plan {
+    pub fn among(mut self, others: &TriMesh) -> PatchPlan {
         self.surroundings = self.surroundings.among(others);
         self
     }
@@ -167,7 +171,7 @@ impl Plan {
         chart: &Chart,
         filled: &[Vec3],
         pulls: &[Pull],
-        options: &Options,
+        options: &PatchOptions,
     ) -> Result<Patch, PatchError> {
         let elastics = &options.elastics;
         let other;

@@ -20,32 +20,32 @@ pub struct Pull {
     /// Where it should lie, scene space.
     pub to: Vec3,
     /// How firmly.
-    pub hold: Hold,
+    pub hold: Firmness,
 }
 
 /// How firmly a pull is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Hold {
+pub enum Firmness {
     /// Like a finger: gives way when the cloth resists.
     Soft,
     /// As near as the strain limit allows.
     Hard,
 }
 
-impl Hold {
+impl Firmness {
     /// Displacement per force that remains, in lengths of the energy's (dimensionless) springs.
     fn compliance(self) -> f64 {
         match self {
-            Hold::Soft => 0.05,
-            Hold::Hard => 0.0,
+            Firmness::Soft => 0.05,
+            Firmness::Hard => 0.0,
         }
     }
 
     /// Largest force, in fingers: strain 1 of a strip as wide as this.
     fn strength(self) -> f64 {
         match self {
-            Hold::Soft => 1.0,
-            Hold::Hard => 4.0,
+            Firmness::Soft => 1.0,
+            Firmness::Hard => 4.0,
         }
     }
 }
@@ -60,7 +60,7 @@ struct Row {
     way: [Vec3; 2],
     /// Share of its way that the point is to go.
     share: f64,
-    hold: Hold,
+    hold: Firmness,
     /// Largest force.
     strength: f64,
 }
@@ -76,7 +76,7 @@ pub(super) struct Grip {
     /// The place it is drawn to.
     pub to: Vec3,
     /// How firmly.
-    pub hold: Hold,
+    pub hold: Firmness,
 }
 
 impl Grip {
@@ -154,7 +154,7 @@ impl Pulls {
     /// altogether: a strained pull at the rim is no reason to let go of one that must be met.
     pub fn ease(&mut self, share: f64) {
         self.easings += 1;
-        let is_soft = |row: &Row| row.hold == Hold::Soft;
+        let is_soft = |row: &Row| row.hold == Firmness::Soft;
         let mixed = self.rows.iter().any(is_soft) && !self.rows.iter().all(is_soft);
         let (soft, hard) = match self.easings {
             n if !mixed || n > SOFT_ALONE => (share, share),

@@ -1,7 +1,7 @@
 //! Laws of patches as a whole.
 
 use super::*;
-use crate::flatten::{Frame, Limits, flatten};
+use crate::flatten::{FlattenLimits, UvSquare, flatten};
 use crate::mesh::intersect::intersections_with;
 use crate::mesh::loops::{LoopKind, boundary_loops};
 use crate::mesh::region;
@@ -20,15 +20,15 @@ fn wavy(slack: f64) -> (Region, Chart, Vec<Vec3>) {
     let loops = boundary_loops(&mesh, &topology);
     let hole = loops.iter().position(|l| l.kind == LoopKind::Hole).unwrap();
     let region = region::grow(&mesh, &topology, &loops, hole, f64::INFINITY).unwrap();
-    let mut chart = flatten(&region, &Limits::default()).unwrap();
+    let mut chart = flatten(&region, &FlattenLimits::default()).unwrap();
     chart.flat.iter_mut().for_each(|p| *p *= slack);
-    chart.frame = Frame::tightest(&chart.flat);
+    chart.frame = UvSquare::tightest(&chart.flat);
     (region, chart, vec![Vec3::zeros(); crate::grid::CELLS])
 }
 
 /// The patch without pulls, its plan, and the inner vertex farthest from the rim.
-fn unpulled(region: &Region, chart: &Chart, filled: &[Vec3]) -> (Plan, Patch, usize) {
-    let options = Options::default();
+fn unpulled(region: &Region, chart: &Chart, filled: &[Vec3]) -> (PatchPlan, Patch, usize) {
+    let options = PatchOptions::default();
     let plan = plan(region, chart, &options).unwrap();
     let patch = plan.patch(chart, filled, &[], &options).unwrap();
     let rim = patch.rim.len();
@@ -42,7 +42,7 @@ fn unpulled(region: &Region, chart: &Chart, filled: &[Vec3]) -> (Plan, Patch, us
     (plan, patch, middle)
 }
 
-fn pulled(slack: f64, to: Vec3, hold: Hold) -> (Patch, Patch, Vec3, f64) {
+fn pulled(slack: f64, to: Vec3, hold: Firmness) -> (Patch, Patch, Vec3, f64) {
     let (region, chart, filled) = wavy(slack);
     let (plan, free, middle) = unpulled(&region, &chart, &filled);
     let pull = Pull {
@@ -51,7 +51,7 @@ fn pulled(slack: f64, to: Vec3, hold: Hold) -> (Patch, Patch, Vec3, f64) {
         hold,
     };
     let patch = plan
-        .patch(&chart, &filled, &[pull], &Options::default())
+        .patch(&chart, &filled, &[pull], &PatchOptions::default())
         .unwrap();
     let rim = patch.rim.len();
     assert_eq!(
@@ -74,7 +74,7 @@ fn planned_or_not_the_patch_is_the_same() {
     let (region, chart, filled) = wavy(1.0);
     let (plan, patch, _) = unpulled(&region, &chart, &filled);
     assert_eq!(
-        build(&region, &chart, &filled, &Options::default()).unwrap(),
+        build(&region, &chart, &filled, &PatchOptions::default()).unwrap(),
         patch
     );
     assert_eq!(plan.flat(), patch.flat);
@@ -85,7 +85,7 @@ fn planned_or_not_the_patch_is_the_same() {
 
 #[test]
 fn a_pull_within_reach_is_met() {
-    for hold in [Hold::Soft, Hold::Hard] {
+    for hold in [Firmness::Soft, Firmness::Hard] {
         let (_, _, _, off) = pulled(1.05, Vec3::new(0.0, 0.0, -0.02), hold);
         // Half a cell of a grid over the whole sheet.
         assert!(off < 0.5 / 64.0, "{off} {hold:?}");
@@ -94,14 +94,14 @@ fn a_pull_within_reach_is_met() {
 
 #[test]
 fn an_absurd_pull_tears_nothing() {
-    let (patch, _, to, off) = pulled(1.0, Vec3::new(4.0, 1.0, 3.0), Hold::Hard);
+    let (patch, _, to, off) = pulled(1.0, Vec3::new(4.0, 1.0, 3.0), Firmness::Hard);
     assert!(off > 4.0);
     assert!(patch.positions.iter().all(|p| (p - to).norm() > 4.0));
 }
 
 #[test]
 fn a_pull_to_where_the_cloth_is_changes_next_to_nothing() {
-    let (patch, free, _, _) = pulled(1.0, Vec3::zeros(), Hold::Soft);
+    let (patch, free, _, _) = pulled(1.0, Vec3::zeros(), Firmness::Soft);
     let squares = patch
         .positions
         .iter()
@@ -114,13 +114,13 @@ fn a_pull_to_where_the_cloth_is_changes_next_to_nothing() {
 fn a_pull_beside_the_hole_or_at_its_rim_does_nothing() {
     let (region, chart, filled) = wavy(1.0);
     let (plan, free, _) = unpulled(&region, &chart, &filled);
-    let beside = (chart.frame.point(Vec2::new(0.02, 0.02)), Hold::Hard);
-    let at_rim = (plan.flat()[0], Hold::Soft);
+    let beside = (chart.frame.point(Vec2::new(0.02, 0.02)), Firmness::Hard);
+    let at_rim = (plan.flat()[0], Firmness::Soft);
     for (at, hold) in [beside, at_rim] {
         let to = Vec3::zeros();
         let pull = Pull { at, to, hold };
         assert_eq!(
-            plan.patch(&chart, &filled, &[pull], &Options::default())
+            plan.patch(&chart, &filled, &[pull], &PatchOptions::default())
                 .unwrap(),
             free
         );
@@ -136,10 +136,10 @@ fn a_pull_draws_no_pimple() {
     let pull = Pull {
         at: free.flat[middle],
         to,
-        hold: Hold::Soft,
+        hold: Firmness::Soft,
     };
     let patch = plan
-        .patch(&chart, &filled, &[pull], &Options::default())
+        .patch(&chart, &filled, &[pull], &PatchOptions::default())
         .unwrap();
     let moved = |v: usize| (patch.positions[v] - free.positions[v]).norm();
     let near = (0..free.flat.len())
@@ -177,8 +177,8 @@ fn a_patch_meets_the_rim_where_it_really_lies_and_keeps_off_other_cloth_there() 
         intersections_with(&all, &own).len()
     };
     let joining = plain.joining(&noisy.mesh.positions).unwrap();
-    let patch = |plan: &Plan| {
-        plan.patch(&chart, &filled, &[], &Options::default())
+    let patch = |plan: &PatchPlan| {
+        plan.patch(&chart, &filled, &[], &PatchOptions::default())
             .unwrap()
     };
     let through = patch(&joining);
@@ -209,8 +209,8 @@ fn a_rim_that_touches_itself_is_closed_where_the_scan_lies() {
     let mut seen = region.clone();
     let apart = (seen.mesh.positions.iter_mut()).enumerate();
     apart.for_each(|(v, p)| p.z += 1e-3 * (v as f64).sin());
-    let chart = flatten(&seen, &Limits::default()).unwrap();
-    let options = Options::default();
+    let chart = flatten(&seen, &FlattenLimits::default()).unwrap();
+    let options = PatchOptions::default();
     let plan = plan_in(&scan, &seen, &chart, &options).unwrap();
     let joining = plan.joining(&region.mesh.positions).unwrap();
     let filled = vec![Vec3::zeros(); crate::grid::CELLS];

@@ -10,7 +10,7 @@ use super::cases::{Case, extent};
 use super::patched::inside;
 use crate::scarffolds::scanned::{Hole, scanned};
 use crate::scarffolds::sheets::Sheet;
-use darn_geometry::flatten::{self, Chart, Limits};
+use darn_geometry::flatten::{self, Chart, FlattenLimits};
 use darn_geometry::grid::{CELLS, cell_centre};
 use darn_geometry::mesh::loops::{LoopKind, boundary_loops};
 use darn_geometry::mesh::region::{Region, grow};
@@ -98,7 +98,7 @@ fn flattened(mesh: &TriMesh) -> Option<Shares> {
     let rim = holes.max_by(|a, b| a.length.total_cmp(&b.length))?;
     let lay = |reach: f64| {
         let region = grow(mesh, &topology, &loops, rim.id as usize, reach).ok()?;
-        let chart = flatten::flatten(&region, &Limits::default()).ok()?;
+        let chart = flatten::flatten(&region, &FlattenLimits::default()).ok()?;
         Some((region, chart))
     };
     let reach = reach_for(rim.length / PI);

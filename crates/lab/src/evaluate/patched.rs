@@ -1,12 +1,12 @@
 //! A filled grid after `patch`: the known cells meshed as a scan whose chart is the grid itself, patched, and read back at the cells.
 
-use darn_geometry::flatten::{Chart, Frame};
+use darn_geometry::flatten::{Chart, UvSquare};
 use darn_geometry::grid::{CELLS, Grid, cell_centre};
 use darn_geometry::mesh::loops::boundary_loops;
 use darn_geometry::mesh::region::{Region, grow};
 use darn_geometry::mesh::topology::Topology;
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
-use darn_geometry::patch::{self, Options, Patch, PatchError, signed_area};
+use darn_geometry::patch::{self, Patch, PatchError, PatchOptions, signed_area};
 
 use super::measure::faces;
 
@@ -20,7 +20,7 @@ pub fn patched(
     grid: &Grid,
     hole: &[bool],
     filled: &[Vec3],
-    options: &Options,
+    options: &PatchOptions,
 ) -> Result<Vec<Vec3>, PatchError> {
     let mesh = TriMesh {
         positions: grid.positions.clone(),
@@ -63,7 +63,7 @@ fn grid_chart(region: &Region) -> Chart {
     let flat = region.vertices.iter().map(|&v| cell_centre(v as usize));
     Chart {
         flat: flat.collect(),
-        frame: Frame {
+        frame: UvSquare {
             origin: Vec2::zeros(),
             axis: Vec2::x(),
             side: 1.0,

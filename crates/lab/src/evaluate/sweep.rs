@@ -9,7 +9,7 @@ use super::report::{Fill, Report, Row, Stage, stages};
 use super::{EvaluateError, Filler};
 use darn_geometry::grid::{CELLS, Grid, NormalGrid, Normalisation};
 use darn_geometry::mesh::Vec3;
-use darn_geometry::patch::Options;
+use darn_geometry::patch::PatchOptions;
 use darn_geometry::smooth::{Smooth, smooth};
 
 /// Cases the network gets together.
@@ -23,7 +23,7 @@ pub struct Plan {
     /// Seed of the noise.
     pub seed: u64,
     /// How patches are made.
-    pub options: Options,
+    pub options: PatchOptions,
 }
 
 /// Measures all cases. `progress` is told how many were just finished, once for each level of noise.
@@ -95,7 +95,7 @@ impl<'a> Seen<'a> {
     fn measured(
         &self,
         answer: &[[f32; 3]],
-        options: &Options,
+        options: &PatchOptions,
     ) -> Result<Vec<Outcome>, EvaluateError> {
         let hole = &self.case.sample.hole;
         let mut all = Vec::new();

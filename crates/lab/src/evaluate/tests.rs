@@ -9,7 +9,7 @@ use crate::scarffolds::samples::{Sample, Sampler, Turning};
 use crate::scarffolds::sheets::Sheet;
 use darn_geometry::grid::{CELLS, SIDE, cell_centre};
 use darn_geometry::mesh::Vec3;
-use darn_geometry::patch::Options;
+use darn_geometry::patch::PatchOptions;
 use darn_geometry::smooth::{Smooth, smooth};
 
 /// A case on a surface over the unit square, with a hole of the given shape.
@@ -111,7 +111,7 @@ fn patches_reach_every_hole_cell_and_keep_flat_cloth_flat() {
         let mut filled = case.answer(&grid);
         let nowhere = Vec3::new(9.0, 9.0, 9.0);
         let truth = filled.clone();
-        let found = patched(&grid, &case.sample.hole, &truth, &Options::default()).unwrap();
+        let found = patched(&grid, &case.sample.hole, &truth, &PatchOptions::default()).unwrap();
         for k in 0..CELLS {
             assert!(
                 (found[k] - truth[k]).norm() < 1e-3 / SIDE as f64,
@@ -122,7 +122,7 @@ fn patches_reach_every_hole_cell_and_keep_flat_cloth_flat() {
         for k in (0..CELLS).filter(|&k| case.sample.hole[k]) {
             filled[k] = nowhere;
         }
-        let found = patched(&grid, &case.sample.hole, &filled, &Options::default()).unwrap();
+        let found = patched(&grid, &case.sample.hole, &filled, &PatchOptions::default()).unwrap();
         assert!((0..CELLS).all(|k| found[k] != nowhere), "{shape:?}");
     }
 }
@@ -158,7 +158,7 @@ fn a_whole_evaluation_has_its_tables_and_pictures() {
     let plan = Plan {
         noises: vec![0.0, 0.2],
         seed: 1,
-        options: Options::default(),
+        options: PatchOptions::default(),
     };
     let zeros = |grids: &[darn_geometry::grid::NormalGrid]| {
         Ok(grids.iter().map(|g| g.positions.clone()).collect())

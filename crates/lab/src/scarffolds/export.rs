@@ -72,7 +72,7 @@ fn upright(sheet: &Sheet) -> TriMesh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use darn_gltf_scan::{Limits, Scan};
+    use darn_gltf_scan::{Scan, ScanLimits};
 
     /// A flat sheet that rises along v.
     fn ramp() -> Sheet {
@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn what_is_high_in_the_simulation_is_high_in_the_scan() {
-        let scan = Scan::read(&as_glb(&ramp(), "ramp").unwrap(), &Limits::default()).unwrap();
+        let scan = Scan::read(&as_glb(&ramp(), "ramp").unwrap(), &ScanLimits::default()).unwrap();
         assert_eq!(scan.surface.faces.len(), 2 * (SIDE - 1) * (SIDE - 1));
         for (p, q) in scan.surface.positions.iter().zip(ramp().positions) {
             assert_eq!([p.x, p.y, p.z], [q[0], q[2], -q[1]].map(f64::from));

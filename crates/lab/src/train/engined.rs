@@ -11,7 +11,7 @@ use super::slopes::slopes;
 use super::student::{Learned, Snapshot, Student};
 use super::{TrainError, TrainOptions};
 use darn_geometry::grid::CELLS;
-use darn_net::engine::{Engine, EngineError, Input, Lessons, Options, Scratch};
+use darn_net::engine::{Engine, EngineError, EngineOptions, Input, Lessons, Scratch};
 use darn_net::weights::NamedTensors;
 use darn_net::{UnetConfig, cells};
 
@@ -29,9 +29,9 @@ pub struct Engined {
 
 impl Engined {
     fn engine(&self, tensors: &NamedTensors) -> Result<Engine, EngineError> {
-        let options = Options {
+        let options = EngineOptions {
             threads: rayon::current_num_threads(),
-            ..Options::default()
+            ..EngineOptions::default()
         };
         Engine::new(tensors, &self.config, options)
     }

@@ -63,7 +63,7 @@ pub struct Settings {
     /// Gradients of the anchor search; the backend's own where there is none.
     pub autodiff: Option<BackendKind>,
     /// How darn's own engine computes.
-    pub engine: engine::Options,
+    pub engine: engine::EngineOptions,
 }
 
 impl From<BackendKind> for Settings {
@@ -97,7 +97,7 @@ fn runtime(
     kind: BackendKind,
     config: &UnetConfig,
     tensors: &NamedTensors,
-    options: engine::Options,
+    options: engine::EngineOptions,
 ) -> Result<Box<dyn Runtime>, NetError> {
     Ok(match kind {
         BackendKind::Engine => Box::new(EngineRuntime::new(tensors, config, options)?),

@@ -8,9 +8,12 @@ pub mod map;
 mod reach;
 mod search;
 
+pub use darn_geometry::patch::Firmness;
 pub use gesture::Hand;
 pub use reach::{Point, Reach};
-pub use search::{Found, Landscape, Options, Slope, Step, descend, exhaust, nearest_cell, seeds};
+pub use search::{
+    Found, Landscape, SearchOptions, Slope, Step, descend, exhaust, nearest_cell, seeds,
+};
 
 use darn_geometry::grid::CELLS;
 use darn_geometry::mesh::{Vec2, Vec3};
@@ -24,15 +27,6 @@ pub struct Wanted {
     pub position: Vec3,
     /// Whether others make room for it.
     pub firmness: Firmness,
-}
-
-/// Whether a wanted position gives way to others.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Firmness {
-    /// It gives way, and gestures move it.
-    Soft,
-    /// It stays where it is wanted as long as the cloth reaches there, and no gesture moves it.
-    Hard,
 }
 
 /// The grid's cells that lie in a hole.

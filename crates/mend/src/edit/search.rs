@@ -36,7 +36,7 @@ pub struct Slope {
 
 /// How far a search goes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
+pub struct SearchOptions {
     /// How many of the best seeds set out; the first seed always does.
     pub walkers: usize,
     /// The longest first step, in cells.
@@ -47,9 +47,9 @@ pub struct Options {
     pub batch: usize,
 }
 
-impl Default for Options {
+impl Default for SearchOptions {
     fn default() -> Self {
-        Options {
+        SearchOptions {
             walkers: 4,
             stride: 8.0,
             steps: 32,
@@ -93,7 +93,7 @@ pub fn descend<L: Landscape>(
     landscape: &L,
     hole: &HoleCells,
     seeds: &[usize],
-    options: &Options,
+    options: &SearchOptions,
 ) -> Result<Option<Found>, L::Error> {
     let mut asked = Asked::of(landscape, options.batch);
     let seeds: Vec<usize> = (seeds.iter().copied())
@@ -145,7 +145,7 @@ pub fn descend<L: Landscape>(
 pub fn exhaust<L: Landscape>(
     landscape: &L,
     hole: &HoleCells,
-    options: &Options,
+    options: &SearchOptions,
 ) -> Result<Option<Found>, L::Error> {
     let mut asked = Asked::of(landscape, options.batch);
     asked.about(hole.indices())?;
@@ -412,8 +412,8 @@ mod tests {
             let hole = disk(14.0);
             let bowl = Bowl(|at: Vec2| (at.x - x).powi(2) + tilt * (at.y - y).powi(2) + 0.3 * (at.x - x) * (at.y - y));
             let first = hole.indices()[start % hole.indices().len()];
-            let found = descend(&bowl, &hole, &seeds(&hole, first, 8), &Options::default()).unwrap().unwrap();
-            let best = exhaust(&bowl, &hole, &Options::default()).unwrap().unwrap();
+            let found = descend(&bowl, &hole, &seeds(&hole, first, 8), &SearchOptions::default()).unwrap().unwrap();
+            let best = exhaust(&bowl, &hole, &SearchOptions::default()).unwrap().unwrap();
             prop_assert_eq!(found.cell, best.cell);
             prop_assert!(found.evaluations < best.evaluations / 3, "{}", found.evaluations);
             prop_assert!(found.path.windows(2).all(|w| w[1].slope.loss < w[0].slope.loss));
@@ -424,7 +424,7 @@ mod tests {
         fn it_ends_on_any_ground(heights in prop::collection::vec(prop_oneof![Just(f64::NAN), -1.0..1.0f64], 4096)) {
             let hole = disk(9.0);
             let ground = Bowl(|at: Vec2| heights[cell_at(at / 64.0)]);
-            let found = descend(&ground, &hole, &seeds(&hole, hole.indices()[0], 5), &Options::default()).unwrap().unwrap();
+            let found = descend(&ground, &hole, &seeds(&hole, hole.indices()[0], 5), &SearchOptions::default()).unwrap().unwrap();
             prop_assert!(hole.contains(found.cell));
             prop_assert!(found.path.len() < 200);
         }
@@ -433,7 +433,7 @@ mod tests {
     #[test]
     fn no_seed_in_the_hole_finds_nothing() {
         let hole = disk(9.0);
-        let found = descend(&Bowl(|_| 0.0), &hole, &[0], &Options::default()).unwrap();
+        let found = descend(&Bowl(|_| 0.0), &hole, &[0], &SearchOptions::default()).unwrap();
         assert_eq!(found, None);
     }
 }

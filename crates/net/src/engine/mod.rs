@@ -68,16 +68,16 @@ pub enum EngineError {
 
 /// How an engine computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Options {
+pub struct EngineOptions {
     /// The instruction set; the CPU's best where there is none.
     pub isa: Option<Isa>,
     /// Threads that share a call's grids, and the layers of each where there are fewer grids than threads.
     pub threads: usize,
 }
 
-impl Default for Options {
+impl Default for EngineOptions {
     fn default() -> Self {
-        Options {
+        EngineOptions {
             isa: None,
             threads: 1,
         }
@@ -138,7 +138,7 @@ impl Engine {
     pub fn new(
         tensors: &NamedTensors,
         config: &UnetConfig,
-        options: Options,
+        options: EngineOptions,
     ) -> Result<Engine, EngineError> {
         let width = config.width;
         if !WIDTHS.contains(&width) {

@@ -163,7 +163,7 @@ pub(super) fn engine(
     threads: usize,
 ) -> Engine {
     let isa = Some(isa);
-    Engine::new(tensors, &config, Options { isa, threads }).unwrap()
+    Engine::new(tensors, &config, EngineOptions { isa, threads }).unwrap()
 }
 
 fn predict(
@@ -385,7 +385,7 @@ fn what_is_wrong_has_a_name() {
     let mut weights = tensors(2);
     let wrong = |weights: &NamedTensors, width: usize| {
         let config = config(width, InputKind::Membrane);
-        Engine::new(weights, &config, Options::default())
+        Engine::new(weights, &config, EngineOptions::default())
             .unwrap_err()
             .to_string()
     };

@@ -1,6 +1,6 @@
 //! Pulls on a planned patch: where they take hold, and how far the cloth follows.
 
-use super::{Plan, grid};
+use super::{PatchPlan, grid};
 use crate::cholesky::NotPositive;
 use crate::flatten::Chart;
 use crate::mesh::{Vec2, Vec3};
@@ -24,7 +24,7 @@ pub fn bearable(before: f64) -> f64 {
     STRETCH.max(MORE * before)
 }
 
-impl Plan {
+impl PatchPlan {
     /// Draws the cloth, at rest where it lies, to where the pulls want it, as far as its strain allows; the rounds.
     pub(super) fn pull(
         &self,
