@@ -12,7 +12,7 @@ pub fn apart(holes: &mut [Filled]) {
         let own = &mut rest[0];
         let others = near(own, before);
         if !others.faces.is_empty() {
-            own.prepared.plan.keep_off(&mut own.patch, &others);
+            own.prepared.plan.separate(&mut own.patch, &others);
         }
     }
 }

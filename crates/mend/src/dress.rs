@@ -12,7 +12,7 @@ use darn_contract::v1;
 use darn_geometry::mesh::Vec3;
 use darn_geometry::mesh::curvature::vertex_normals;
 use darn_geometry::mesh::region::Region;
-use darn_geometry::patch::attributes::{Columns, dress};
+use darn_geometry::patch::attributes::{Columns, extend_attributes};
 use darn_geometry::patch::{Patch, quality};
 use darn_gltf_scan::{Addition, Part, PatchPoint, Scan};
 use darn_net::WeightsCard;
@@ -74,7 +74,7 @@ pub fn addition(
         width,
     };
     let (dressed, normals) = rayon::join(
-        || dress((&prepared.plan, patch), region, chart, &columns),
+        || extend_attributes(&prepared.plan, patch, region, chart, &columns),
         || normals(patch, region),
     );
     let points = dressed.corners.iter().map(|c| match c.scan {

@@ -91,7 +91,7 @@ fn drawn(
 ) -> Result<Patch, MendError> {
     let stretch = |patch: &Patch| quality::measure(patch, &prepared.region).stretch_max;
     let usual = stretch(&unedited.patch);
-    let most = patch::bearable(usual);
+    let most = patch::stretch_limit(usual);
     let mut share = 1.0;
     for _ in 0..TRIES {
         let each = unedited.filled.iter().zip(moved);

@@ -327,11 +327,11 @@ impl Laid {
             let others = layers_near(&cloth.welded.mesh, &self.region, beyond);
             let plan = patch::plan_in(&cloth.welded.mesh, seen, &self.chart, &limits.patch)
                 .and_then(|plan| match &self.smooth {
-                    Some(_) => plan.joining(&self.region.mesh.positions),
+                    Some(_) => plan.with_region_at(&self.region.mesh.positions),
                     None => Ok(plan),
                 })
                 .map_err(|source| MendError::Patch { hole: id, source })?;
-            Ok::<_, MendError>((plan.among(&others), milliseconds(started)))
+            Ok::<_, MendError>((plan.with_layers(&others), milliseconds(started)))
         };
         let (sampled, planned) = rayon::join(sample, plan);
         let (grid, normal, cells, base, raster) = sampled?;

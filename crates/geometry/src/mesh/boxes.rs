@@ -7,14 +7,16 @@ const LEAF: usize = 4;
 
 /// An axis-parallel box.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Bounds {
-    low: Vec3,
-    high: Vec3,
+pub(crate) struct Bounds {
+    /// Least coordinates.
+    pub low: Vec3,
+    /// Largest coordinates.
+    pub high: Vec3,
 }
 
 impl Bounds {
     /// The box of a face; `None` when a corner is not finite.
-    pub(super) fn of(mesh: &TriMesh, face: u32) -> Option<Bounds> {
+    pub(crate) fn of(mesh: &TriMesh, face: u32) -> Option<Bounds> {
         let [a, b, c] = mesh.triangle(face as usize);
         let finite = [a, b, c].iter().all(|p| p.iter().all(|x| x.is_finite()));
         finite.then(|| Bounds {
@@ -24,11 +26,12 @@ impl Bounds {
     }
 
     /// Whether two boxes have a point in common.
-    pub(super) fn meets(&self, other: &Bounds) -> bool {
+    pub(crate) fn meets(&self, other: &Bounds) -> bool {
         (0..3).all(|d| self.low[d] <= other.high[d] && other.low[d] <= self.high[d])
     }
 
-    fn merged(self, other: Bounds) -> Bounds {
+    /// The box around two boxes.
+    pub(crate) fn merged(self, other: Bounds) -> Bounds {
         Bounds {
             low: self.low.inf(&other.low),
             high: self.high.sup(&other.high),

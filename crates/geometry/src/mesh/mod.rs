@@ -2,7 +2,7 @@
 //! Small free functions on `TriMesh`, one idea a file; everything is in scene units and f64.
 //! No glTF, no charts, no grids, no files: those rooms stand on this one.
 
-mod boxes;
+pub(crate) mod boxes;
 mod collar;
 pub mod curvature;
 pub mod denoise;

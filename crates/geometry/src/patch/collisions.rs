@@ -1,99 +1,112 @@
-//! Pushing apart what crosses after strain limiting: the patch with itself and with the cloth around it.
+//! Collisions after strain limiting: a patch that cuts itself or the scan around it is pushed apart.
 //!
-//! Where two pieces of cloth cross they meet along a curve; moving them apart so that the curve shortens untangles them without knowing
-//! which side is which (Volino & Magnenat-Thalmann 2006, "Resolving surface collisions through intersection contour minimization").
-//! Costs one sweep over the boxes when nothing crosses.
+//! Two surfaces that cut each other meet along a curve. Moves that shorten the curve separate them, and need not know
+//! which side is which (Volino & Magnenat-Thalmann 2006, "Resolving surface collisions through intersection contour
+//! minimization"). Costs one sweep over the boxes when nothing cuts.
 
 use super::Patch;
-use super::crossings::crossings;
+use super::intersections::intersections_from;
 use super::triangulate::Triangulation;
 use crate::mesh::region::Region;
 use crate::mesh::{TriMesh, Vec3};
 
-/// The cloth around a patch, and how the patch's triangles continue it.
+/// The scan around a patch with the patch's faces: what is tested for collisions.
 #[derive(Debug, Clone)]
-pub(super) struct Surroundings {
-    /// The region's vertices; the patch's inner ones are appended to them.
+pub(super) struct CollisionMesh {
+    /// Held vertices: the region's, then those of other layers. The patch's inner ones come after them.
     positions: Vec<Vec3>,
-    /// The region's faces, then the patch's.
+    /// Held faces: the region's, then those of other layers; then the patch's.
     faces: Vec<[u32; 3]>,
+    /// The patch's first face.
     first_face: usize,
-    /// Edges of the patch with a free end and their lengths in the chart.
-    edges: Vec<(u32, u32, f64)>,
-    /// Mean of these lengths.
-    edge: f64,
+    /// Edges of the patch with a free end.
+    edges: Vec<RestEdge>,
+    /// Mean of their lengths, scene units.
+    mean_edge: f64,
 }
 
-/// Most rounds of pushing.
+/// An edge with its length in the chart, scene units.
+#[derive(Debug, Clone)]
+struct RestEdge {
+    from: u32,
+    to: u32,
+    length: f64,
+}
+
+/// Most rounds of pushes.
 const ROUNDS: usize = 100;
-/// Push of one round, in mean edges.
+/// Longest push of one round, in mean edges.
 const PUSH: f64 = 0.35;
-/// Sweeps of length correction after each push.
+/// Sweeps of length correction after each round of pushes.
 const SWEEPS: usize = 4;
-/// Lengths within 1 ± this are left alone while pushing.
+/// Lengths within 1 ± this of their rest lengths are not corrected.
 const GIVE: f64 = 0.03;
 
-impl Surroundings {
-    /// The cloth of a region around the patch that closes its hole.
-    pub fn new(rim: &[u32], tiled: &Triangulation, region: &Region) -> Surroundings {
+impl CollisionMesh {
+    /// The region with the patch that closes its hole; `rim` holds the region vertices of the hole's polygon.
+    pub fn new(rim: &[u32], triangulation: &Triangulation, region: &Region) -> CollisionMesh {
         let base = region.mesh.positions.len() as u32;
         let corners = rim.len() as u32;
-        let place = |v: u32| rim.get(v as usize).copied().unwrap_or(base + v - corners);
+        let vertex = |v: u32| rim.get(v as usize).copied().unwrap_or(base + v - corners);
         let mut faces = region.mesh.faces.clone();
-        faces.extend(tiled.faces.iter().map(|f| f.map(place)));
-        let mut edges: Vec<(u32, u32)> = (tiled.faces.iter())
+        faces.extend(triangulation.faces.iter().map(|f| f.map(vertex)));
+        let mut edges: Vec<(u32, u32)> = (triangulation.faces.iter())
             .flat_map(|f| [(f[0], f[1]), (f[1], f[2]), (f[2], f[0])])
             .map(|(a, b)| (a.min(b), a.max(b)))
             .filter(|(_, b)| *b >= corners)
             .collect();
         edges.sort_unstable();
         edges.dedup();
-        let length =
-            |(a, b): (u32, u32)| (tiled.points[a as usize] - tiled.points[b as usize]).norm();
-        let edges: Vec<(u32, u32, f64)> = (edges.into_iter())
-            .map(|e| (place(e.0), place(e.1), length(e)))
+        let at = |v: u32| triangulation.points[v as usize];
+        let edges: Vec<RestEdge> = (edges.into_iter())
+            .map(|(a, b)| RestEdge {
+                from: vertex(a),
+                to: vertex(b),
+                length: (at(a) - at(b)).norm(),
+            })
             .collect();
-        Surroundings {
+        CollisionMesh {
             positions: region.mesh.positions.clone(),
             first_face: region.mesh.faces.len(),
             faces,
-            edge: edges.iter().map(|e| e.2).sum::<f64>() / edges.len().max(1) as f64,
+            mean_edge: edges.iter().map(|e| e.length).sum::<f64>() / edges.len().max(1) as f64,
             edges,
         }
     }
 
-    /// The same where the region's vertices lie elsewhere.
-    pub fn around(mut self, region: &[Vec3]) -> Surroundings {
+    /// The same with the region's vertices at other positions.
+    pub fn with_region_at(mut self, region: &[Vec3]) -> CollisionMesh {
         self.positions[..region.len()].copy_from_slice(region);
         self
     }
 
-    /// The same with other cloth that the patch must not cut: layers that lie over or under it, beyond the region.
-    pub fn among(mut self, others: &TriMesh) -> Surroundings {
-        let (base, more) = (self.positions.len() as u32, others.positions.len() as u32);
-        // The patch's inner vertices come after all that is held.
+    /// The same with more of the scan that the patch must not cut: layers over or under it, beyond the region.
+    pub fn with_layers(mut self, layers: &TriMesh) -> CollisionMesh {
+        let (base, more) = (self.positions.len() as u32, layers.positions.len() as u32);
+        // The patch's inner vertices come after all held ones.
         let moved = |v: u32| if v < base { v } else { v + more };
         for face in &mut self.faces[self.first_face..] {
             *face = face.map(moved);
         }
-        for (a, b, _) in &mut self.edges {
-            (*a, *b) = (moved(*a), moved(*b));
+        for edge in &mut self.edges {
+            (edge.from, edge.to) = (moved(edge.from), moved(edge.to));
         }
-        self.positions.extend_from_slice(&others.positions);
-        let held = others.faces.iter().map(|f| f.map(|v| base + v));
+        self.positions.extend_from_slice(&layers.positions);
+        let held = layers.faces.iter().map(|f| f.map(|v| base + v));
         self.faces.splice(self.first_face..self.first_face, held);
-        self.first_face += others.faces.len();
+        self.first_face += layers.faces.len();
         self
     }
 
-    /// Bytes held.
+    /// Bytes of memory held.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.positions[..])
             + size_of_val(&self.faces[..])
             + size_of_val(&self.edges[..])
     }
 
-    /// Moves inner vertices of the patch until nothing crosses, or as little as can be had; the patch counts what that took away and left.
+    /// Moves inner vertices of the patch until nothing cuts, or keeps the round with the fewest cuts. Adds the pairs
+    /// that came apart to `patch.collisions` and leaves the rest in `patch.crossings`.
     pub fn separate(&self, patch: &mut Patch) {
         let (rim, base) = (patch.rim.len(), self.positions.len());
         let mut positions = self.positions.clone();
@@ -102,7 +115,7 @@ impl Surroundings {
             positions,
             faces: self.faces.clone(),
         };
-        let mut pairs = crossings(&mesh, self.first_face);
+        let mut pairs = intersections_from(&mesh, self.first_face);
         let found = pairs.len();
         let mut least = found;
         for _ in 0..ROUNDS {
@@ -113,7 +126,7 @@ impl Surroundings {
             for _ in 0..SWEEPS {
                 self.restore_lengths(&mut mesh.positions);
             }
-            pairs = crossings(&mesh, self.first_face);
+            pairs = intersections_from(&mesh, self.first_face);
             if pairs.len() < least {
                 least = pairs.len();
                 patch.positions[rim..].copy_from_slice(&mesh.positions[base..]);
@@ -123,7 +136,7 @@ impl Surroundings {
         patch.crossings = least;
     }
 
-    /// One step along the gradients of the crossing curves.
+    /// One step along the gradients of the intersection curves' lengths.
     fn push(&self, mesh: &mut TriMesh, pairs: &[(u32, u32)]) {
         let base = self.positions.len();
         let mut moves = vec![Vec3::zeros(); mesh.positions.len() - base];
@@ -140,7 +153,7 @@ impl Surroundings {
                 let (a, b) = (self.faces[own as usize], self.faces[other as usize]);
                 for k in 0..3 {
                     let edge = [a[k], a[(k + 1) % 3], a[(k + 2) % 3]];
-                    if let Some(crossing) = Crossing::of(
+                    if let Some(crossing) = EdgeCrossing::new(
                         edge.map(|v| mesh.positions[v as usize]),
                         mesh.triangle(other as usize),
                     ) {
@@ -151,28 +164,27 @@ impl Surroundings {
                 }
             }
         }
-        // A lone vertex pushed is a spike: half of each move is shared with the neighbours.
+        // Neighbours take part in half of each move: a vertex that moves alone is a spike.
         let mut shared = moves.clone();
-
-        for (a, b, _) in &self.edges {
+        for edge in &self.edges {
             if let (Some(a), Some(b)) = (
-                (*a as usize).checked_sub(base),
-                (*b as usize).checked_sub(base),
+                (edge.from as usize).checked_sub(base),
+                (edge.to as usize).checked_sub(base),
             ) {
                 shared[a] += moves[b] * 0.5;
                 shared[b] += moves[a] * 0.5;
             }
         }
         for (k, d) in shared.into_iter().enumerate() {
-            mesh.positions[base + k] += d.cap_magnitude(1.0) * (PUSH * self.edge);
+            mesh.positions[base + k] += d.cap_magnitude(1.0) * (PUSH * self.mean_edge);
         }
     }
 
-    /// Brings edges that the pushing stretched or squeezed back, in order.
+    /// Corrects the lengths of edges that the pushes stretched or compressed, one edge after the other.
     fn restore_lengths(&self, positions: &mut [Vec3]) {
         let base = self.positions.len();
-        for (a, b, length) in &self.edges {
-            let (a, b) = (*a as usize, *b as usize);
+        for RestEdge { from, to, length } in &self.edges {
+            let (a, b) = (*from as usize, *to as usize);
             let d = positions[b] - positions[a];
             let now = d.norm();
             let wanted = now.clamp(length * (1.0 - GIVE), length * (1.0 + GIVE));
@@ -189,19 +201,20 @@ impl Surroundings {
     }
 }
 
-/// An edge of one face that passes through another.
-struct Crossing {
-    /// Where on the edge, from 0 at its start to 1 at its end.
+/// The point where an edge of one face passes through another face.
+struct EdgeCrossing {
+    /// Its place on the edge, from 0 at the start to 1 at the end.
     along: f64,
-    /// Where in the other face.
+    /// Its barycentric weights in the other face.
     weights: [f64; 3],
-    /// The way the edge should move against the face so that the curve of crossing shortens; about unit length.
+    /// The direction in which the edge should move, relative to the face, to shorten the intersection curve; length at
+    /// most 1.
     push: Vec3,
 }
 
-impl Crossing {
-    /// The crossing of the edge from corner 0 to corner 1 of a face with another face.
-    fn of(face: [Vec3; 3], other: [Vec3; 3]) -> Option<Crossing> {
+impl EdgeCrossing {
+    /// Where the edge from corner 0 to corner 1 of a face passes through another face.
+    fn new(face: [Vec3; 3], other: [Vec3; 3]) -> Option<EdgeCrossing> {
         let (u, v) = (other[1] - other[0], other[2] - other[0]);
         let normal = u.cross(&v).try_normalize(0.0)?;
         let side = |p: &Vec3| normal.dot(&(p - other[0]));
@@ -220,17 +233,17 @@ impl Crossing {
         if weights.iter().any(|w| *w < 0.0) {
             return None;
         }
-        // The curve runs in both planes, from the edge into its face.
+        // The direction of the curve: in both planes, from the edge into its face.
         let own = (face[1] - face[0]).cross(&(face[2] - face[0]));
         let line = own.cross(&normal).try_normalize(0.0)?;
         let inward = own.cross(&(face[1] - face[0]));
         let curve = if line.dot(&inward) > 0.0 { line } else { -line };
         let edge = (face[1] - face[0]).try_normalize(0.0)?;
-        // d(length) = −d · (R − (E·R ÷ E·N) N); a grazing edge would be sent far.
+        // d(length) = −d · (R − (E·R ÷ E·N) N); the least slope bounds the push of a grazing edge.
         let slope = edge.dot(&normal);
         let slope = slope.signum() * slope.abs().max(0.2);
         let push = curve - normal * (edge.dot(&curve) / slope);
-        Some(Crossing {
+        Some(EdgeCrossing {
             along,
             weights,
             push: push.cap_magnitude(1.0),
@@ -243,7 +256,8 @@ mod tests {
     use super::*;
     use crate::mesh::Vec2;
 
-    /// A lattice of n × n vertices, unit spacing, lifted by `z` of its place; faces from vertex `first` on.
+    /// A lattice of n × n vertices, unit spacing, at height `z` of their place; its faces count vertices from `first`
+    /// on.
     fn lattice(n: u32, first: u32, z: impl Fn(Vec2) -> f64) -> (Vec<Vec3>, Vec<[u32; 3]>) {
         let middle = Vec2::repeat(f64::from(n - 1) / 2.0);
         let at = |k: u32| Vec2::new(f64::from(k % n), f64::from(k / n)) - middle;
@@ -259,24 +273,26 @@ mod tests {
     }
 
     #[test]
-    fn a_dent_through_another_layer_comes_back_out() {
+    fn a_dent_through_another_layer_is_removed() {
         let (positions, mut faces) = lattice(14, 0, |p| 0.01 * p.x);
         let (first_face, base) = (faces.len(), positions.len() as u32);
         let (tile, tile_faces) = lattice(9, base, |p| 0.5 - 0.9 * (-0.5 * p.norm_squared()).exp());
         faces.extend(&tile_faces);
-        let edges: Vec<(u32, u32, f64)> = (tile_faces.iter())
+        let at = |v: u32| tile[(v - base) as usize];
+        let edges: Vec<RestEdge> = (tile_faces.iter())
             .flat_map(|f| [(f[0], f[1]), (f[1], f[2])])
-            .map(|(a, b)| {
-                let at = |v: u32| tile[(v - base) as usize];
-                (a, b, (at(a) - at(b)).norm())
+            .map(|(from, to)| RestEdge {
+                from,
+                to,
+                length: (at(from) - at(to)).norm(),
             })
             .collect();
-        let around = Surroundings {
+        let around = CollisionMesh {
             positions,
             faces,
             first_face,
             edges,
-            edge: 1.0,
+            mean_edge: 1.0,
         };
         let mut patch = Patch {
             rim: Vec::new(),
@@ -291,23 +307,29 @@ mod tests {
             positions: around.positions.iter().chain(tile).copied().collect(),
             faces: around.faces.clone(),
         };
-        let before = crossings(&joined(&tile), first_face).len();
+        let before = intersections_from(&joined(&tile), first_face).len();
         assert!(before > 0);
         around.separate(&mut patch);
         assert_eq!((patch.collisions, patch.crossings), (before, 0));
-        assert_eq!(crossings(&joined(&patch.positions), first_face), []);
+        assert_eq!(
+            intersections_from(&joined(&patch.positions), first_face),
+            []
+        );
         let again = patch.positions.clone();
         around.separate(&mut patch);
         assert_eq!(patch.collisions, before, "counted once");
-        assert_eq!(patch.positions, again, "what does not cross is left alone");
+        assert_eq!(
+            patch.positions, again,
+            "a patch that cuts nothing stays as it is"
+        );
 
-        // Where all of the cloth below is another layer, the same comes of it.
+        // The result is the same when all of the mesh below is another layer.
         let layer = TriMesh {
             positions: around.positions.clone(),
             faces: around.faces[..first_face].to_vec(),
         };
         let own = |v: u32| v - base;
-        let alone = Surroundings {
+        let alone = CollisionMesh {
             positions: Vec::new(),
             faces: around.faces[first_face..]
                 .iter()
@@ -317,14 +339,18 @@ mod tests {
             edges: around
                 .edges
                 .iter()
-                .map(|(a, b, l)| (own(*a), own(*b), *l))
+                .map(|e| RestEdge {
+                    from: own(e.from),
+                    to: own(e.to),
+                    length: e.length,
+                })
                 .collect(),
-            edge: 1.0,
+            mean_edge: 1.0,
         };
         (patch.positions, patch.collisions) = (tile, 0);
         alone.clone().separate(&mut patch);
         assert_eq!(patch.collisions, 0, "it does not cut itself");
-        alone.among(&layer).separate(&mut patch);
+        alone.with_layers(&layer).separate(&mut patch);
         assert_eq!((patch.collisions, patch.crossings), (before, 0));
         assert_eq!(patch.positions, again);
     }

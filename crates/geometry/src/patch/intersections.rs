@@ -1,17 +1,21 @@
-//! Which triangles of a patch cut each other or the cloth around: sweeps along one axis, floating-point rejection with margins, and the
-//! exact predicates of `mesh::intersect` on the few pairs that are left.
+//! Which triangles of a patch cut each other or the scan around it: a sweep along one axis finds pairs with overlapping
+//! boxes, plane tests with an error margin reject most of them, the exact predicates of `mesh::intersect` judge the
+//! rest.
 
+use crate::mesh::boxes::Bounds;
 use crate::mesh::intersect::intersections_with;
 use crate::mesh::{TriMesh, Vec3};
 
-/// All pairs of faces `(f, g)`, `f < g`, that cut each other, `g` at least `first`; ascending. The same as `intersections_with` gives.
-pub(super) fn crossings(mesh: &TriMesh, first: usize) -> Vec<(u32, u32)> {
-    let doubtful = doubtful(mesh, first);
-    if doubtful.is_empty() {
+/// All pairs of faces `(f, g)`, `f < g`, that cut each other, with `g` not below `first`; ascending.
+///
+/// The same result as [`intersections_with`] for the faces from `first` on, in less time.
+pub(super) fn intersections_from(mesh: &TriMesh, first: usize) -> Vec<(u32, u32)> {
+    let candidates = candidates(mesh, first);
+    if candidates.is_empty() {
         return Vec::new();
     }
-    // The exact test, on a mesh of the doubtful faces alone.
-    let mut faces: Vec<u32> = doubtful.iter().flat_map(|(f, g)| [*f, *g]).collect();
+    // The exact test, on a mesh of the candidates alone.
+    let mut faces: Vec<u32> = candidates.iter().flat_map(|(f, g)| [*f, *g]).collect();
     faces.sort_unstable();
     faces.dedup();
     let few = mesh.part(faces.iter().map(|f| mesh.faces[*f as usize]));
@@ -20,25 +24,24 @@ pub(super) fn crossings(mesh: &TriMesh, first: usize) -> Vec<(u32, u32)> {
         .filter(|(_, f)| **f as usize >= first)
         .map(|(k, _)| k)
         .collect();
-    // `faces` ascend, so the pairs do, too.
+    // `faces` ascends, so the pairs do, too.
     let found = intersections_with(&few, &asked).into_iter();
     found
         .map(|(f, g)| (faces[f as usize], faces[g as usize]))
         .collect()
 }
 
-/// Pairs that may cut: boxes overlap and no plane test keeps them surely apart. Two faces below `first` are never compared.
-fn doubtful(mesh: &TriMesh, first: usize) -> Vec<(u32, u32)> {
-    let boxed = |face: usize| Boxed::of(mesh, face);
-    let mut own: Vec<Boxed> = (first..mesh.faces.len()).filter_map(boxed).collect();
-    if own.is_empty() {
+/// Pairs that may cut: their boxes overlap and no plane test separates them. Two faces below `first` are never
+/// compared.
+fn candidates(mesh: &TriMesh, first: usize) -> Vec<(u32, u32)> {
+    let boxed = |face: usize| FaceBox::new(mesh, face);
+    let mut own: Vec<FaceBox> = (first..mesh.faces.len()).filter_map(boxed).collect();
+    let Some(all) = own.iter().map(|b| b.bounds).reduce(Bounds::merged) else {
         return Vec::new();
-    }
-    let low = own.iter().fold(own[0].low, |m, b| m.inf(&b.low));
-    let high = own.iter().fold(own[0].high, |m, b| m.sup(&b.high));
-    let near = |b: &Boxed| (0..3).all(|d| b.low[d] <= high[d] && b.high[d] >= low[d]);
-    let mut held: Vec<Boxed> = (0..first).filter_map(boxed).filter(near).collect();
-    let strips = Strips::of(&own, &held, (low, high));
+    };
+    let near = |b: &FaceBox| b.bounds.meets(&all);
+    let mut held: Vec<FaceBox> = (0..first).filter_map(boxed).filter(near).collect();
+    let strips = Strips::new(&own, &held, &all);
     let (own, held) = (strips.cut(&mut own), strips.cut(&mut held));
     let mut pairs = Vec::new();
     for (strip, (own, held)) in own.iter().zip(&held).enumerate() {
@@ -52,48 +55,45 @@ fn doubtful(mesh: &TriMesh, first: usize) -> Vec<(u32, u32)> {
 }
 
 /// A face with its box.
-struct Boxed {
-    low: Vec3,
-    high: Vec3,
+struct FaceBox {
+    bounds: Bounds,
     face: u32,
 }
 
-impl Boxed {
-    /// `None` when a corner is not finite: such a face counts as cutting nothing.
-    fn of(mesh: &TriMesh, face: usize) -> Option<Boxed> {
-        let [a, b, c] = mesh.triangle(face);
-        let finite = [a, b, c].iter().all(|p| p.iter().all(|x| x.is_finite()));
-        finite.then(|| Boxed {
-            low: a.inf(&b).inf(&c),
-            high: a.sup(&b).sup(&c),
-            face: face as u32,
-        })
-    }
-
-    fn meets(&self, other: &Boxed) -> bool {
-        (0..3).all(|d| self.low[d] <= other.high[d] && other.low[d] <= self.high[d])
+impl FaceBox {
+    /// The box of a face; `None` when a corner is not finite, because such a face cuts nothing.
+    fn new(mesh: &TriMesh, face: usize) -> Option<FaceBox> {
+        let face = face as u32;
+        Bounds::of(mesh, face).map(|bounds| FaceBox { bounds, face })
     }
 }
 
-/// Strips side by side over the patch, each swept by itself: a sweep over all of a sheet compares every face with a whole row of others.
+/// Strips side by side over the patch, each swept by itself: one sweep over a whole sheet would compare every face with
+/// a row of others.
 struct Strips {
-    /// The axis that is swept along, and the one that strips follow each other on.
+    /// The axis of the sweep.
     along: usize,
+    /// The axis on which strips follow each other.
     across: usize,
+    /// Where the first strip starts on it, scene units.
     bottom: f64,
+    /// Width of a strip, scene units.
     width: f64,
+    /// Index of the last strip.
     last: usize,
 }
 
-/// How many strips of a width there are below a height. The cast takes what is negative to 0, and so it does 0 ÷ 0, of a patch that is
-/// a line.
+/// How many strips of this width lie below a height. The cast takes negative heights to 0, and also 0 ÷ 0, where the
+/// patch is a line.
 fn strips_below(height: f64, width: f64) -> usize {
     (height / width) as usize
 }
 
 impl Strips {
-    /// As wide as a box in the mean, at least: so that all boxes together lie in no more than about three strips each.
-    fn of(own: &[Boxed], held: &[Boxed], (low, high): (Vec3, Vec3)) -> Strips {
+    /// Strips over the box `all` of the patch, at least as wide as the mean box, so that a box lies in about three
+    /// strips at most.
+    fn new(own: &[FaceBox], held: &[FaceBox], all: &Bounds) -> Strips {
+        let Bounds { low, high } = all;
         let size = high - low;
         let along = size.imax();
         let (second, third) = ((along + 1) % 3, (along + 2) % 3);
@@ -102,7 +102,9 @@ impl Strips {
         } else {
             second
         };
-        let within = |b: &Boxed| b.high[across].min(high[across]) - b.low[across].max(low[across]);
+        let within = |b: &FaceBox| {
+            b.bounds.high[across].min(high[across]) - b.bounds.low[across].max(low[across])
+        };
         let count = own.len() + held.len();
         let mean = own.iter().chain(held).map(within).sum::<f64>() / count as f64;
         let width = mean.max(size[across] / count as f64);
@@ -115,36 +117,42 @@ impl Strips {
         }
     }
 
-    /// The strip of a place; what lies beside the patch counts to the outermost.
-    fn at(&self, place: f64) -> usize {
-        strips_below(place - self.bottom, self.width).min(self.last)
+    /// The strip at a coordinate; coordinates beyond the patch belong to the outermost strips.
+    fn at(&self, coordinate: f64) -> usize {
+        strips_below(coordinate - self.bottom, self.width).min(self.last)
     }
 
     /// The boxes that reach into each strip, ascending along the sweep.
-    fn cut<'b>(&self, boxes: &'b mut [Boxed]) -> Vec<Vec<&'b Boxed>> {
-        let low = |b: &Boxed| b.low[self.along];
+    fn cut<'b>(&self, boxes: &'b mut [FaceBox]) -> Vec<Vec<&'b FaceBox>> {
+        let low = |b: &FaceBox| b.bounds.low[self.along];
         boxes.sort_unstable_by(|a, b| low(a).total_cmp(&low(b)).then(a.face.cmp(&b.face)));
         let mut strips = vec![Vec::new(); self.last + 1];
         for b in &*boxes {
-            for strip in &mut strips[self.at(b.low[self.across])..=self.at(b.high[self.across])] {
+            let (from, to) = (b.bounds.low[self.across], b.bounds.high[self.across]);
+            for strip in &mut strips[self.at(from)..=self.at(to)] {
                 strip.push(b);
             }
         }
         strips
     }
 
-    /// The first strip that two boxes which meet reach into both: the one in which their pair counts.
-    fn first_of_both(&self, a: &Boxed, b: &Boxed) -> usize {
-        self.at(a.low[self.across].max(b.low[self.across]))
+    /// The first strip that two boxes have in common; their pair is counted there.
+    fn first_of_both(&self, a: &FaceBox, b: &FaceBox) -> usize {
+        self.at(a.bounds.low[self.across].max(b.bounds.low[self.across]))
     }
 
-    /// Calls `found` with every pair of boxes of a strip that meet, one of them at least the patch's own; each pair once.
-    fn sweep(&self, own: &[&Boxed], held: &[&Boxed], mut found: impl FnMut(&Boxed, &Boxed)) {
-        let low = |b: &Boxed| b.low[self.along];
-        let mut start_from = |a: &Boxed, others: &[&Boxed]| {
+    /// Calls `found` once with every pair of boxes in a strip that meet, at least one of them the patch's own.
+    fn sweep(
+        &self,
+        own: &[&FaceBox],
+        held: &[&FaceBox],
+        mut found: impl FnMut(&FaceBox, &FaceBox),
+    ) {
+        let low = |b: &FaceBox| b.bounds.low[self.along];
+        let mut start_from = |a: &FaceBox, others: &[&FaceBox]| {
             (others.iter())
-                .take_while(|b| low(b) <= a.high[self.along])
-                .filter(|b| a.meets(b))
+                .take_while(|b| low(b) <= a.bounds.high[self.along])
+                .filter(|b| a.bounds.meets(&b.bounds))
                 .for_each(|b| found(a, b));
         };
         for (k, a) in own.iter().enumerate() {
@@ -157,7 +165,7 @@ impl Strips {
     }
 }
 
-/// Whether floating point alone shows that two faces do not cut each other, or they share an edge.
+/// Whether plane tests in floating point show that two faces do not cut each other; also true when they share an edge.
 fn surely_apart(mesh: &TriMesh, f: u32, g: u32) -> bool {
     let (f, g) = (mesh.faces[f as usize], mesh.faces[g as usize]);
     let (mut turned_f, mut turned_g, mut shared) = (f, g, 0);
@@ -173,12 +181,12 @@ fn surely_apart(mesh: &TriMesh, f: u32, g: u32) -> bool {
     }
     let place = |v: u32| mesh.positions[v as usize];
     let (a, b) = (turned_f.map(place), turned_g.map(place));
-    // With a shared corner, which comes first now, only the edges opposite it can pass through the other face.
+    // A shared corner comes first now; then only the edge opposite it can pass through the other face.
     let edges = if shared == 1 { 1..2 } else { 0..3 };
     misses(&a, &b, edges.clone()) && misses(&b, &a, edges)
 }
 
-/// Whether none of the edges of `a` passes through `b`, for sure.
+/// Whether certainly none of these edges of `a` (k: from corner k to k + 1) passes through `b`.
 fn misses(a: &[Vec3; 3], b: &[Vec3; 3], mut edges: std::ops::Range<usize>) -> bool {
     let (u, v) = (b[1] - b[0], b[2] - b[0]);
     let normal = u.cross(&v);
@@ -192,7 +200,7 @@ fn misses(a: &[Vec3; 3], b: &[Vec3; 3], mut edges: std::ops::Range<usize>) -> bo
         if (below > doubt && above > doubt) || (below < -doubt && above < -doubt) {
             return true;
         }
-        // The line from p to q passes beside the face when it turns one way round one side and the other way round another.
+        // The line from p to q misses the face when it passes its sides with different turns.
         let along = q - p;
         let corners = b.map(|c| c - p);
         let turn = |k: usize| along.dot(&corners[k].cross(&corners[(k + 1) % 3]));
@@ -201,7 +209,7 @@ fn misses(a: &[Vec3; 3], b: &[Vec3; 3], mut edges: std::ops::Range<usize>) -> bo
     })
 }
 
-/// Rounding of a volume, in cubed lengths: far above what f64 loses.
+/// Bound of the rounding error of a volume ÷ cubed length; far above that of f64.
 const MARGIN: f64 = 1e-13;
 
 #[cfg(test)]
@@ -210,10 +218,10 @@ mod tests {
     use crate::mesh::shapes::{sheet, together};
     use proptest::prelude::*;
 
-    /// Where a triangle lies, the logarithm of its size, its corners at size 1.
+    /// Position of a triangle, decimal logarithm of its size, its corners at size 1.
     type Placed = ([f64; 3], f64, [[f64; 3]; 3]);
 
-    /// Triangles that share no corners; these in whole units of `grain`.
+    /// Triangles that share no vertices; coordinates are multiples of `grain`.
     fn scattered(places: &[Placed], grain: f64) -> TriMesh {
         let rounded = |p: Vec3| p.map(|x| (x / grain).round() * grain);
         let corners = |(place, log, corners): &Placed| {
@@ -228,17 +236,17 @@ mod tests {
         }
     }
 
-    /// [`doubtful`] by looking at all pairs, ascending.
-    fn doubtful_of_all(mesh: &TriMesh, first: usize) -> Vec<(u32, u32)> {
-        let boxes: Vec<Boxed> = (0..mesh.faces.len())
-            .filter_map(|f| Boxed::of(mesh, f))
+    /// [`candidates`] by a look at all pairs, ascending.
+    fn candidates_of_all(mesh: &TriMesh, first: usize) -> Vec<(u32, u32)> {
+        let boxes: Vec<FaceBox> = (0..mesh.faces.len())
+            .filter_map(|f| FaceBox::new(mesh, f))
             .collect();
         let pairs = boxes.iter().enumerate().flat_map(|(k, a)| {
             let later = boxes[k + 1..].iter();
             later.map(move |b| (a, b))
         });
         pairs
-            .filter(|(a, b)| b.face as usize >= first && a.meets(b))
+            .filter(|(a, b)| b.face as usize >= first && a.bounds.meets(&b.bounds))
             .map(|(a, b)| (a.face, b.face))
             .filter(|(f, g)| !surely_apart(mesh, *f, *g))
             .collect()
@@ -255,9 +263,9 @@ mod tests {
             let mut mesh = scattered(&places, grain);
             mesh.positions.iter_mut().for_each(|p| p.y *= flat);
             let first = (share * mesh.faces.len() as f64) as usize;
-            let mut found = doubtful(&mesh, first);
+            let mut found = candidates(&mesh, first);
             found.sort_unstable();
-            prop_assert_eq!(found, doubtful_of_all(&mesh, first), "each pair once");
+            prop_assert_eq!(found, candidates_of_all(&mesh, first), "each pair once");
         }
 
         #[test]
@@ -274,12 +282,12 @@ mod tests {
             };
             let first = (share * mesh.faces.len() as f64) as usize;
             let own: Vec<u32> = (first as u32..mesh.faces.len() as u32).collect();
-            prop_assert_eq!(crossings(&mesh, first), intersections_with(&mesh, &own));
+            prop_assert_eq!(intersections_from(&mesh, first), intersections_with(&mesh, &own));
         }
     }
 
     #[test]
-    fn layers_cut_where_the_tree_finds_it_though_a_corner_is_no_number() {
+    fn layers_with_corners_that_are_not_finite_cut_where_the_tree_finds_it() {
         let n = 40;
         let wall = sheet(
             n,
@@ -292,7 +300,7 @@ mod tests {
         for (held, patch) in [(&wall, &floor), (&floor, &wall)] {
             let (both, first) = (together(held, patch), held.faces.len());
             let own: Vec<u32> = (first as u32..both.faces.len() as u32).collect();
-            let found = crossings(&both, first);
+            let found = intersections_from(&both, first);
             assert!(found.len() >= 2 * n - 2, "{}", found.len());
             assert_eq!(found, intersections_with(&both, &own));
         }
