@@ -207,7 +207,7 @@ const MARGIN: f64 = 1e-13;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::shapes::{sheet, together};
+    use crate::mesh::shapes::{concat, sheet};
     use proptest::prelude::*;
 
     /// Where a triangle lies, the logarithm of its size, its corners at size 1.
@@ -290,7 +290,7 @@ mod tests {
         floor.positions[0].x = f64::NAN;
         floor.positions[n].z = f64::INFINITY;
         for (held, patch) in [(&wall, &floor), (&floor, &wall)] {
-            let (both, first) = (together(held, patch), held.faces.len());
+            let (both, first) = (concat(held, patch), held.faces.len());
             let own: Vec<u32> = (first as u32..both.faces.len() as u32).collect();
             let found = crossings(&both, first);
             assert!(found.len() >= 2 * n - 2, "{}", found.len());

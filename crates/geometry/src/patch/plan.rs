@@ -57,7 +57,9 @@ pub fn plan_in(
     options: &PatchOptions,
 ) -> Result<PatchPlan, PatchError> {
     let rim = turned(region);
-    let scanned: Vec<u32> = (rim.iter()).map(|v| region.vertices[*v as usize]).collect();
+    let scanned: Vec<u32> = (rim.iter())
+        .map(|v| region.vertices[*v as usize].0)
+        .collect();
     let places = Places::of(&at(&scanned, scan), scan);
     planned(rim, places, (region, chart), options)
 }
