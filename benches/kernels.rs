@@ -31,8 +31,8 @@ fn hole() -> Hole {
     let welded = weld(&scan.surface);
     let topology = welded.topology();
     let loops = boundary_loops(&welded.mesh, &topology);
-    let hole = loops.iter().position(|l| l.kind == LoopKind::Hole);
-    let rim = hole.expect("the example has a hole");
+    let rim = loops.iter().find(|l| l.kind == LoopKind::Hole);
+    let rim = rim.expect("the example has a hole").id;
     let region = grow(&welded.mesh, &topology, &loops, rim, REACH).expect("it is a disk");
     let chart = flatten::flatten(&region, &Default::default()).expect("it lies flat");
     let grid = flatten::raster(&region.mesh, &chart);

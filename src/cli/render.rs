@@ -36,7 +36,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         .or_fail(format!("read {}", args.scan.display()))?;
     let welded = weld::weld(&scan.surface);
     let tints: Vec<[u8; 3]> = welded
-        .face_of
+        .soup_face
         .iter()
         .map(|&face| tint(&scan, face))
         .collect();

@@ -7,7 +7,7 @@ use darn_contract::port::Mended;
 use darn_geometry::mesh::curvature::{face_areas, vertex_normals};
 use darn_geometry::mesh::loops::{BoundaryLoop, boundary_loops};
 use darn_geometry::mesh::topology::Topology;
-use darn_geometry::mesh::weld::{Welded, weld};
+use darn_geometry::mesh::weld::{WeldedMesh, weld};
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
 use darn_gltf_scan::Scan;
 use darn_gltf_scan::export::{Fresh, glb};
@@ -90,7 +90,7 @@ pub fn mended(bytes: &[u8], constraints: &Constraints) -> Result<Mended, MendErr
 /// A mended scan, welded, and which of its faces are reconstructed.
 pub struct Seen {
     pub scan: Scan,
-    pub welded: Welded,
+    pub welded: WeldedMesh,
     pub topology: Topology,
     pub loops: Vec<BoundaryLoop>,
     pub patch: Vec<usize>,
@@ -103,7 +103,7 @@ impl Seen {
         let topology = Topology::new(&welded.mesh);
         let loops = boundary_loops(&welded.mesh, &topology);
         let new = |f: &usize| {
-            let part = scan.part_of_face(welded.face_of[*f]).expect("a part");
+            let part = scan.part_of_face(welded.soup_face[*f]).expect("a part");
             scan.parts[part].reconstructed
         };
         let patch = (0..welded.mesh.faces.len()).filter(new).collect();

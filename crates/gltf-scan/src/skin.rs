@@ -70,7 +70,7 @@ pub(super) fn carried(
         faces: Vec::new(),
     };
     let nearest = |at: &[f32; 3]| {
-        let (vertex, _) = closest_vertex(&rim, &place(at))?;
+        let vertex = closest_vertex(&rim, &place(at))?;
         known.get(vertex as usize).copied()
     };
     let of_points = own.iter().zip(places).map(|(own, at)| {

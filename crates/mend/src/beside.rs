@@ -49,7 +49,7 @@ fn rim<'a>(filled: &'a Filled) -> impl Iterator<Item = u32> + 'a {
         .patch
         .rim
         .iter()
-        .map(|v| region.vertices[*v as usize])
+        .map(|v| region.vertices[*v as usize].0)
 }
 
 fn bounds(positions: &[Vec3]) -> (Vec3, Vec3) {

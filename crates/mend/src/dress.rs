@@ -126,7 +126,7 @@ pub fn addition(
 /// Whether most of a region shows its other side by triangles of its own.
 fn is_backed(region: &Region, cloth: &Cloth) -> bool {
     let backed = region.faces.iter();
-    let backed = backed.filter(|f| cloth.welded.backed[**f as usize]).count();
+    let backed = backed.filter(|f| cloth.welded.two_sided[f.index()]).count();
     2 * backed > region.faces.len()
 }
 

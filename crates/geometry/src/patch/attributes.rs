@@ -386,8 +386,9 @@ fn affine_fit(samples: &[(u32, Vec2)], columns: &Columns, patch: &Patch) -> DMat
 mod tests {
     use super::*;
     use crate::flatten::{FlattenLimits, flatten};
+    use crate::mesh::index::FaceId;
     use crate::mesh::loops::{LoopKind, boundary_loops};
-    use crate::mesh::shapes::{exploded, sheet, together};
+    use crate::mesh::shapes::{concat, explode, sheet};
     use crate::mesh::weld::weld;
     use crate::mesh::{TriMesh, Vec3, region};
     use crate::patch::{PatchOptions, plan};
@@ -400,7 +401,7 @@ mod tests {
         });
         let plain = left.positions.iter().map(|p| vec![0.4 * p.x, p.y]);
         let mirrored = right.positions.iter().map(|p| vec![1.0 - 0.4 * p.x, p.y]);
-        (together(&left, &right), plain.chain(mirrored).collect())
+        (concat(&left, &right), plain.chain(mirrored).collect())
     }
 
     /// The attributed patch of a mesh's hole; `texture` holds the columns of its vertices.
@@ -408,8 +409,8 @@ mod tests {
         let welded = weld(soup);
         let topology = welded.topology();
         let loops = boundary_loops(&welded.mesh, &topology);
-        let hole = loops.iter().position(|l| l.kind == LoopKind::Hole).unwrap();
-        let region = region::grow(&welded.mesh, &topology, &loops, hole, f64::INFINITY).unwrap();
+        let hole = loops.iter().find(|l| l.kind == LoopKind::Hole).unwrap();
+        let region = region::grow(&welded.mesh, &topology, &loops, hole.id, f64::INFINITY).unwrap();
         let chart = flatten(&region, &FlattenLimits::default()).unwrap();
         let (options, filled) = (
             PatchOptions::default(),
@@ -418,7 +419,7 @@ mod tests {
         let plan = plan(&region, &chart, &options).unwrap();
         let patch = plan.patch(&chart, &filled, &[], &options).unwrap();
 
-        let source = |f: &u32| soup.faces[welded.face_of[*f as usize] as usize];
+        let source = |f: &FaceId| soup.faces[welded.soup_face[f.index()] as usize];
         let corners: Vec<Option<[u32; 3]>> = region.faces.iter().map(|f| Some(source(f))).collect();
         let mut any = vec![0; region.mesh.positions.len()];
         for (face, f) in region.mesh.faces.iter().zip(&region.faces) {
@@ -441,7 +442,7 @@ mod tests {
             .map(|v| texture[*v as usize].clone())
             .collect();
         let shared = attributed(&soup, &texture);
-        let apart = attributed(&exploded(&soup), &own);
+        let apart = attributed(&explode(&soup), &own);
         assert_eq!(apart.faces, shared.faces);
         assert_eq!(apart.corners.len(), shared.corners.len());
         for (a, b) in apart.corners.iter().zip(&shared.corners) {
@@ -458,7 +459,7 @@ mod tests {
 
     #[test]
     fn without_columns_there_are_no_seams() {
-        let soup = exploded(&two_islands().0);
+        let soup = explode(&two_islands().0);
         let bare = attributed(&soup, &vec![Vec::new(); soup.positions.len()]);
         let vertices: BTreeSet<u32> = bare.corners.iter().map(|c| c.vertex).collect();
         assert_eq!(vertices.len(), bare.corners.len());

@@ -2,7 +2,7 @@
 //! boxes, plane tests with an error margin reject most of them, the exact predicates of `mesh::intersect` judge the
 //! rest.
 
-use crate::mesh::boxes::Bounds;
+use crate::mesh::bounds::Bounds;
 use crate::mesh::intersect::intersections_with;
 use crate::mesh::{TriMesh, Vec3};
 
@@ -64,7 +64,7 @@ impl FaceBox {
     /// The box of a face; `None` when a corner is not finite, because such a face cuts nothing.
     fn new(mesh: &TriMesh, face: usize) -> Option<FaceBox> {
         let face = face as u32;
-        Bounds::of(mesh, face).map(|bounds| FaceBox { bounds, face })
+        Bounds::of_face(mesh, face as usize).map(|bounds| FaceBox { bounds, face })
     }
 }
 
@@ -215,7 +215,7 @@ const MARGIN: f64 = 1e-13;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::shapes::{sheet, together};
+    use crate::mesh::shapes::{concat, sheet};
     use proptest::prelude::*;
 
     /// Position of a triangle, decimal logarithm of its size, its corners at size 1.
@@ -298,7 +298,7 @@ mod tests {
         floor.positions[0].x = f64::NAN;
         floor.positions[n].z = f64::INFINITY;
         for (held, patch) in [(&wall, &floor), (&floor, &wall)] {
-            let (both, first) = (together(held, patch), held.faces.len());
+            let (both, first) = (concat(held, patch), held.faces.len());
             let own: Vec<u32> = (first as u32..both.faces.len() as u32).collect();
             let found = intersections_from(&both, first);
             assert!(found.len() >= 2 * n - 2, "{}", found.len());

@@ -5,7 +5,7 @@ use crate::flatten::{FlattenLimits, UvSquare, flatten};
 use crate::mesh::intersect::intersections_with;
 use crate::mesh::loops::{LoopKind, boundary_loops};
 use crate::mesh::region;
-use crate::mesh::shapes::{shaken, sheet};
+use crate::mesh::shapes::{jitter, sheet};
 use crate::mesh::topology::Topology;
 use crate::mesh::weld::weld;
 
@@ -18,8 +18,8 @@ fn wavy(slack: f64) -> (Region, Chart, Vec<Vec3>) {
     let mesh = weld(&sheet(36, keep, wave)).mesh;
     let topology = Topology::new(&mesh);
     let loops = boundary_loops(&mesh, &topology);
-    let hole = loops.iter().position(|l| l.kind == LoopKind::Hole).unwrap();
-    let region = region::grow(&mesh, &topology, &loops, hole, f64::INFINITY).unwrap();
+    let hole = loops.iter().find(|l| l.kind == LoopKind::Hole).unwrap();
+    let region = region::grow(&mesh, &topology, &loops, hole.id, f64::INFINITY).unwrap();
     let mut chart = flatten(&region, &FlattenLimits::default()).unwrap();
     chart.flat.iter_mut().for_each(|p| *p *= slack);
     chart.frame = UvSquare::tightest(&chart.flat);
@@ -171,7 +171,7 @@ fn a_patch_meets_a_moved_rim_and_avoids_a_layer_there() {
     let (plain, free, middle) = unpulled(&region, &chart, &filled);
     let up = Vec3::new(0.0, 0.0, 0.05);
     let mut noisy = region.clone();
-    noisy.mesh = shaken(&region.mesh, 0.002, 1);
+    noisy.mesh = jitter(&region.mesh, 0.002, 1);
     noisy.mesh.positions.iter_mut().for_each(|p| *p += up);
     // The layer lies below the patch, except for a bump through it, and above where the patch would lie without the
     // shift.
@@ -221,8 +221,8 @@ fn a_rim_that_touches_itself_is_closed_on_the_scan() {
     let scan = weld(&sheet(18, |u, v| !in_hole(u, v), wave)).mesh;
     let topology = Topology::new(&scan);
     let loops = boundary_loops(&scan, &topology);
-    let hole = loops.iter().position(|l| l.kind == LoopKind::Hole).unwrap();
-    let region = region::grow(&scan, &topology, &loops, hole, f64::INFINITY).unwrap();
+    let hole = loops.iter().find(|l| l.kind == LoopKind::Hole).unwrap();
+    let region = region::grow(&scan, &topology, &loops, hole.id, f64::INFINITY).unwrap();
     let mut seen = region.clone();
     let apart = (seen.mesh.positions.iter_mut()).enumerate();
     apart.for_each(|(v, p)| p.z += 1e-3 * (v as f64).sin());

@@ -33,7 +33,7 @@ pub fn patched(
         let polygon: Vec<Vec2> = rim
             .vertices
             .iter()
-            .map(|&v| cell_centre(v as usize))
+            .map(|v| cell_centre(v.index()))
             .collect();
         // Cloth lies left of its boundary, so a hole's rim runs clockwise round it in the chart.
         let own: Vec<usize> = if signed_area(&polygon) < 0.0 {
@@ -46,7 +46,7 @@ pub fn patched(
         if own.is_empty() {
             continue;
         }
-        let Ok(region) = grow(&mesh, &topology, &loops, rim.id as usize, f64::INFINITY) else {
+        let Ok(region) = grow(&mesh, &topology, &loops, rim.id, f64::INFINITY) else {
             continue;
         };
         let chart = grid_chart(&region);
@@ -60,7 +60,7 @@ pub fn patched(
 
 /// The chart in which every cell is where the grid has it; uv and the plane are one.
 fn grid_chart(region: &Region) -> Chart {
-    let flat = region.vertices.iter().map(|&v| cell_centre(v as usize));
+    let flat = region.vertices.iter().map(|v| cell_centre(v.index()));
     Chart {
         flat: flat.collect(),
         frame: UvSquare {

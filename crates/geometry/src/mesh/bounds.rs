@@ -1,4 +1,6 @@
-//! Bounding boxes of faces in a binary tree, split at the median of the longest side.
+//! Axis-parallel bounding boxes of faces, and a binary tree of them, split at the median of the longest side.
+
+use std::ops::Range;
 
 use super::{TriMesh, Vec3};
 
@@ -10,14 +12,14 @@ const LEAF: usize = 4;
 pub(crate) struct Bounds {
     /// Least coordinates.
     pub low: Vec3,
-    /// Largest coordinates.
+    /// Greatest coordinates.
     pub high: Vec3,
 }
 
 impl Bounds {
     /// The box of a face; `None` when a corner is not finite.
-    pub(crate) fn of(mesh: &TriMesh, face: u32) -> Option<Bounds> {
-        let [a, b, c] = mesh.triangle(face as usize);
+    pub fn of_face(mesh: &TriMesh, face: usize) -> Option<Bounds> {
+        let [a, b, c] = mesh.triangle(face);
         let finite = [a, b, c].iter().all(|p| p.iter().all(|x| x.is_finite()));
         finite.then(|| Bounds {
             low: a.inf(&b).inf(&c),
@@ -26,12 +28,12 @@ impl Bounds {
     }
 
     /// Whether two boxes have a point in common.
-    pub(crate) fn meets(&self, other: &Bounds) -> bool {
+    pub fn meets(&self, other: &Bounds) -> bool {
         (0..3).all(|d| self.low[d] <= other.high[d] && other.low[d] <= self.high[d])
     }
 
-    /// The box around two boxes.
-    pub(crate) fn merged(self, other: Bounds) -> Bounds {
+    /// The smallest box around both.
+    pub fn merged(self, other: Bounds) -> Bounds {
         Bounds {
             low: self.low.inf(&other.low),
             high: self.high.sup(&other.high),
@@ -44,12 +46,21 @@ impl Bounds {
     }
 }
 
-/// Boxes and what is in them, in a tree.
-pub(super) struct Tree {
+/// A face and its box.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct BoundedFace {
+    /// The box.
+    pub bounds: Bounds,
+    /// The face.
+    pub face: u32,
+}
+
+/// Faces in a tree of boxes.
+pub(super) struct BoxTree {
     /// In preorder.
     nodes: Vec<Node>,
     /// Leaf by leaf.
-    items: Vec<(Bounds, u32)>,
+    items: Vec<BoundedFace>,
 }
 
 struct Node {
@@ -57,34 +68,33 @@ struct Node {
     /// The first node that is not below this one.
     skip: usize,
     /// The items of a leaf; empty above leaves.
-    items: (usize, usize),
+    items: Range<usize>,
 }
 
-impl Tree {
-    /// A tree of the given boxes. O(n log n).
-    pub(super) fn new(mut items: Vec<(Bounds, u32)>) -> Tree {
+impl BoxTree {
+    /// A tree of the given faces. O(n log n).
+    pub fn new(mut items: Vec<BoundedFace>) -> BoxTree {
         let mut nodes = Vec::with_capacity(items.len());
         grow(&mut nodes, &mut items, 0);
-        Tree { nodes, items }
+        BoxTree { nodes, items }
     }
 
     /// The box of everything; `None` for an empty tree.
-    pub(super) fn bounds(&self) -> Option<&Bounds> {
+    pub fn bounds(&self) -> Option<&Bounds> {
         self.nodes.first().map(|n| &n.bounds)
     }
 
     /// Calls `found` with every face whose box meets the given one.
-    pub(super) fn meeting(&self, bounds: &Bounds, mut found: impl FnMut(u32)) {
+    pub fn meeting(&self, bounds: &Bounds, mut found: impl FnMut(u32)) {
         let mut at = 0;
         while let Some(node) = self.nodes.get(at) {
             if !node.bounds.meets(bounds) {
                 at = node.skip;
                 continue;
             }
-            let (first, end) = node.items;
-            for (own, face) in &self.items[first..end] {
-                if own.meets(bounds) {
-                    found(*face);
+            for item in &self.items[node.items.clone()] {
+                if item.bounds.meets(bounds) {
+                    found(item.face);
                 }
             }
             at += 1;
@@ -92,9 +102,10 @@ impl Tree {
     }
 }
 
-/// Appends the nodes of `items`, which start at `offset` among all; recursion is as deep as the tree, which halving keeps flat.
-fn grow(nodes: &mut Vec<Node>, items: &mut [(Bounds, u32)], offset: usize) {
-    let Some(bounds) = items.iter().map(|i| i.0).reduce(Bounds::merged) else {
+/// Appends the nodes of `items`, which start at `offset` among all. The recursion is log₂ n deep: each step halves
+/// the items.
+fn grow(nodes: &mut Vec<Node>, items: &mut [BoundedFace], offset: usize) {
+    let Some(bounds) = items.iter().map(|i| i.bounds).reduce(Bounds::merged) else {
         return;
     };
     let own = nodes.len();
@@ -103,18 +114,17 @@ fn grow(nodes: &mut Vec<Node>, items: &mut [(Bounds, u32)], offset: usize) {
         bounds,
         skip: 0,
         items: if leaf {
-            (offset, offset + items.len())
+            offset..offset + items.len()
         } else {
-            (0, 0)
+            0..0
         },
     });
     if !leaf {
         let axis = (bounds.high - bounds.low).imax();
         let half = items.len() / 2;
-        let middle = |item: &(Bounds, u32)| (item.0.middle(axis), item.1);
         items.select_nth_unstable_by(half, |a, b| {
-            let (a, b) = (middle(a), middle(b));
-            a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))
+            let middles = a.bounds.middle(axis).total_cmp(&b.bounds.middle(axis));
+            middles.then(a.face.cmp(&b.face))
         });
         let (left, right) = items.split_at_mut(half);
         grow(nodes, left, offset);

@@ -1,4 +1,4 @@
-//! The unit square of uv laid over a chart: its tightest enclosing square, any rotation.
+//! The unit square of uv laid over a chart: the smallest enclosing square over all rotations.
 
 use crate::mesh::Vec2;
 
@@ -7,17 +7,18 @@ use crate::mesh::Vec2;
 pub struct UvSquare {
     /// The corner at uv (0, 0).
     pub origin: Vec2,
-    /// Unit vector along u; v is this turned left by a quarter.
+    /// Unit vector along u; v runs along this vector rotated by +90°.
     pub axis: Vec2,
     /// Side length, the chart's units.
     pub side: f64,
 }
 
-/// Directions tried for the square; a finer search moves the side by less than a tenth of a per cent.
+/// Rotations tried for the square; a finer search changes the side by less than a tenth of a per cent.
 const DIRECTIONS: usize = 180;
 
 impl UvSquare {
-    /// The smallest square, over `DIRECTIONS` rotations of a quarter turn, that holds all points; centred on them.
+    /// The smallest square that holds all points, over 180 rotations within a quarter turn; centred on the points.
+    /// Meaningless without points.
     pub fn tightest(points: &[Vec2]) -> UvSquare {
         let points = &convex_hull(points)[..];
         let candidates = (0..DIRECTIONS).map(|k| {
@@ -33,6 +34,7 @@ impl UvSquare {
             })
     }
 
+    /// The smallest square along `axis` that holds all points.
     fn along(axis: Vec2, points: &[Vec2]) -> UvSquare {
         let up = Vec2::new(-axis.y, axis.x);
         let (mut low, mut high) = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
@@ -51,13 +53,15 @@ impl UvSquare {
         }
     }
 
-    /// Chart point to uv.
+    /// The uv of a chart point.
+    #[inline]
     pub fn uv(&self, p: Vec2) -> Vec2 {
         let d = p - self.origin;
         Vec2::new(self.axis.dot(&d), self.axis.perp(&d)) / self.side
     }
 
-    /// Uv to chart point.
+    /// The chart point at a uv.
+    #[inline]
     pub fn point(&self, uv: Vec2) -> Vec2 {
         let up = Vec2::new(-self.axis.y, self.axis.x);
         self.origin + (self.axis * uv.x + up * uv.y) * self.side
@@ -96,29 +100,18 @@ mod tests {
             points in prop::collection::vec((-5.0..5.0f64, -5.0..5.0f64), 3..40)
         ) {
             let points: Vec<Vec2> = points.into_iter().map(|(x, y)| Vec2::new(x, y)).collect();
-            let frame = UvSquare::tightest(&points);
+            let square = UvSquare::tightest(&points);
             for p in &points {
-                let uv = frame.uv(*p);
+                let uv = square.uv(*p);
                 prop_assert!(uv.min() >= -1e-12 && uv.max() <= 1.0 + 1e-12);
-                prop_assert!((frame.point(uv) - p).norm() < 1e-11);
+                prop_assert!((square.point(uv) - p).norm() < 1e-11);
             }
         }
     }
 
     #[test]
-    fn a_turned_square_is_found() {
-        let turned: Vec<Vec2> = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)]
-            .map(Vec2::from_tuple)
-            .to_vec();
-        assert!((UvSquare::tightest(&turned).side - 2f64.sqrt()).abs() < 1e-9);
-    }
-
-    trait FromTuple {
-        fn from_tuple(p: (f64, f64)) -> Self;
-    }
-    impl FromTuple for Vec2 {
-        fn from_tuple(p: (f64, f64)) -> Self {
-            Vec2::new(p.0, p.1)
-        }
+    fn a_rotated_square_is_found() {
+        let rotated = [Vec2::x(), Vec2::y(), -Vec2::x(), -Vec2::y()];
+        assert!((UvSquare::tightest(&rotated).side - 2f64.sqrt()).abs() < 1e-9);
     }
 }
