@@ -27,7 +27,7 @@ const REACH: f64 = 0.25;
 
 fn hole() -> Hole {
     let bytes = std::fs::read("examples/scarf_hole.glb").expect("run in the repository's root");
-    let scan = Scan::read(&bytes, &Default::default()).expect("the example is a scan");
+    let scan = Scan::read(bytes, &Default::default()).expect("the example is a scan");
     let welded = weld(&scan.surface);
     let topology = welded.topology();
     let loops = boundary_loops(&welded.mesh, &topology);

@@ -13,7 +13,7 @@ use darn_contract::{Anchor, Constraints, Edit, Gesture, Search};
 use darn_geometry::mesh::curvature::vertex_normals;
 use darn_geometry::mesh::{Vec2, Vec3};
 use darn_gltf_scan::Scan;
-use darn_gltf_scan::export::{Fresh, glb};
+use darn_gltf_scan::export::{NewMesh, glb};
 use darn_lab::scarffolds::scanned::{Hole, scanned};
 use darn_lab::scarffolds::sheets;
 use darn_lab::scarffolds::sheets::Sheet;
@@ -125,14 +125,14 @@ impl Case {
             .iter()
             .map(|n| n.cast().into())
             .collect();
-        let fresh = Fresh {
+        let fresh = NewMesh {
             name: "sheet",
             positions: &positions,
             normals: &normals,
             texcoords: &[],
             faces: &mesh.faces,
         };
-        let scan = Scan::read(&glb(&fresh).ok()?, &darn_gltf_scan::ScanLimits::default()).ok()?;
+        let scan = Scan::read(glb(&fresh).ok()?, &darn_gltf_scan::ScanLimits::default()).ok()?;
         let started = Instant::now();
         let session = ScanSession::open(
             scan,

@@ -3,7 +3,7 @@
 //! `cargo run --release --example holed_scarf -- [SEED] [INDEX] [OUT]`
 
 use darn_geometry::mesh::{Vec2, curvature::vertex_normals};
-use darn_gltf_scan::export::{Fresh, glb};
+use darn_gltf_scan::export::{NewMesh, glb};
 use darn_lab::scarffolds::scanned::{Hole, scanned};
 use darn_lab::scarffolds::sheets;
 use rand::SeedableRng;
@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .iter()
         .map(|p| [p.x as f32, 1.0 - p.y as f32])
         .collect();
-    let bytes = glb(&Fresh {
+    let bytes = glb(&NewMesh {
         name: "scarf",
         positions: &positions,
         normals: &normals,

@@ -68,7 +68,7 @@ fn survive(bytes: &[u8]) -> Result<(), ScanError> {
         max_faces: 10_000,
         ..ScanLimits::default()
     };
-    let scan = Scan::read(bytes, &limits)?;
+    let scan = Scan::read(bytes.to_vec(), &limits)?;
     assert!(
         scan.surface.positions.len() <= limits.max_vertices
             && scan.surface.faces.len() <= limits.max_faces
@@ -83,6 +83,11 @@ fn survive(bytes: &[u8]) -> Result<(), ScanError> {
     );
     assert_eq!(scan.write(&[])?, bytes);
     Ok(())
+}
+
+/// Whether an error begins with the JSON pointer of a place.
+fn names(error: &ScanError, pointer: &str) -> bool {
+    error.to_string().starts_with(&format!("{pointer}: "))
 }
 
 /// The edited scan's error.
@@ -126,14 +131,17 @@ fn named_bad_scans_are_refused_by_name() {
         "{index}"
     );
     let accessor = refused(|json, _| json["meshes"][0]["primitives"][0]["indices"] = json!(77));
-    assert_eq!(accessor.pointer(), Some("/meshes/0/primitives/0/indices"));
+    assert!(
+        names(&accessor, "/meshes/0/primitives/0/indices"),
+        "{accessor}"
+    );
     let huge = refused(|json, _| json["buffers"][0]["byteLength"] = json!(1_u64 << 31));
-    assert_eq!(huge.pointer(), Some("/buffers/0/byteLength"));
+    assert!(names(&huge, "/buffers/0/byteLength"), "{huge}");
     assert!(huge.to_string().contains("2147483648"), "{huge}");
     let count = refused(|json, _| json["accessors"][0]["count"] = json!(u64::MAX));
-    assert_eq!(count.pointer(), Some("/accessors/0"));
+    assert!(names(&count, "/accessors/0"), "{count}");
     let cycle = refused(|json, _| json["nodes"][1]["children"] = json!([0]));
-    assert_eq!(cycle.pointer(), Some("/nodes/1/children/0"));
+    assert!(names(&cycle, "/nodes/1/children/0"), "{cycle}");
     let empty = refused(|json, _| json["scenes"] = json!([{}]));
     assert!(matches!(empty, ScanError::NoTriangles), "{empty}");
     assert!(matches!(
@@ -157,7 +165,7 @@ fn zeros_that_nothing_backs_stay_within_the_limits() {
         json["accessors"][3] =
             json!({"componentType": 5126, "type": "VEC3", "count": 1_000_000_000});
     });
-    assert_eq!(sets.pointer(), Some("/accessors/3"));
+    assert!(names(&sets, "/accessors/3"), "{sets}");
 }
 
 #[test]

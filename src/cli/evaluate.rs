@@ -4,7 +4,7 @@ use super::failure::{Failure, OrFail};
 use super::files;
 use super::mended::mended;
 use super::network::mender;
-use super::progress::Progress;
+use super::progress::WorkProgress;
 use crate::settings::NetworkArgs;
 use darn_geometry::grid::NormalGrid;
 use darn_geometry::patch::PatchOptions;
@@ -89,7 +89,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         options: PatchOptions::default(),
     };
     let work = cases.len() * plan.noises.len();
-    let progress = Progress::counted("samples", work as u64);
+    let progress = WorkProgress::counted("samples", work as u64);
     let report = evaluate::run(&cases, &plan, &fill, &|done| progress.advance(done as u64));
     drop(progress);
     let report = report.or_fail("evaluate")?;

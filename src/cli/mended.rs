@@ -3,7 +3,7 @@
 use darn_contract::Constraints;
 use darn_geometry::mesh::curvature::vertex_normals;
 use darn_geometry::mesh::{TriMesh, Vec3, weld};
-use darn_gltf_scan::export::{Fresh, glb};
+use darn_gltf_scan::export::{NewMesh, glb};
 use darn_gltf_scan::{Scan, ScanLimits};
 use darn_lab::evaluate::EvaluateError;
 use darn_lab::scarffolds::scanned::Scanned;
@@ -22,14 +22,14 @@ fn through_glb(
     let triple = |p: &Vec3| [p.x as f32, p.y as f32, p.z as f32];
     let positions: Vec<[f32; 3]> = scanned.mesh.positions.iter().map(triple).collect();
     let normals: Vec<[f32; 3]> = vertex_normals(&scanned.mesh).iter().map(triple).collect();
-    let bytes = glb(&Fresh {
+    let bytes = glb(&NewMesh {
         name: "scan",
         positions: &positions,
         normals: &normals,
         texcoords: &[],
         faces: &scanned.mesh.faces,
     })?;
-    let scan = Scan::read(&bytes, &ScanLimits::default())?;
+    let scan = Scan::read(bytes, &ScanLimits::default())?;
     // Sheets hang along −z.
     let architecture = mender.networks.default().card().architecture;
     let constraints = Constraints {
@@ -37,6 +37,6 @@ fn through_glb(
         ..Constraints::default()
     };
     let mended = darn_mend::mend(&scan, &constraints, mender)?;
-    let scan = Scan::read(&mended.bytes, &ScanLimits::default())?;
+    let scan = Scan::read(mended.bytes, &ScanLimits::default())?;
     Ok(weld::weld(&scan.surface).mesh)
 }

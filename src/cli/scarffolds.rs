@@ -2,7 +2,7 @@
 
 use super::failure::{Failure, OrFail};
 use super::files;
-use super::progress::Progress;
+use super::progress::WorkProgress;
 use darn_lab::scarffolds::export::{as_glb, contact_sheet};
 use darn_lab::scarffolds::sheets::{self, Sheet};
 use image::ImageFormat;
@@ -45,7 +45,7 @@ enum Format {
 }
 
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let progress = Progress::counted("sheets", args.count as u64);
+    let progress = WorkProgress::counted("sheets", args.count as u64);
     let made = sheets::generate(args.count, args.seed, &args.out, &|finished| {
         progress.advance(finished as u64)
     });

@@ -10,7 +10,7 @@ use darn_geometry::mesh::topology::Topology;
 use darn_geometry::mesh::weld::{WeldedMesh, weld};
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
 use darn_gltf_scan::Scan;
-use darn_gltf_scan::export::{Fresh, glb};
+use darn_gltf_scan::export::{NewMesh, glb};
 use darn_lab::scarffolds::scanned::{Hole, Scanned, scanned};
 use darn_lab::scarffolds::sheets::{self, Sheet};
 use darn_mend::{MendError, NetworkMender, mend};
@@ -69,7 +69,7 @@ pub fn packed(mesh: &TriMesh, texcoords: &[[f32; 2]]) -> Vec<u8> {
     let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| p.cast().into()).collect();
     let normals = vertex_normals(mesh);
     let normals: Vec<[f32; 3]> = normals.iter().map(|n| n.cast().into()).collect();
-    let fresh = Fresh {
+    let fresh = NewMesh {
         name: "scarf",
         positions: &positions,
         normals: &normals,
@@ -80,7 +80,7 @@ pub fn packed(mesh: &TriMesh, texcoords: &[[f32; 2]]) -> Vec<u8> {
 }
 
 pub fn read(bytes: &[u8]) -> Scan {
-    Scan::read(bytes, &darn_gltf_scan::ScanLimits::default()).expect("a readable scan")
+    Scan::read(bytes.to_vec(), &darn_gltf_scan::ScanLimits::default()).expect("a readable scan")
 }
 
 pub fn mended(bytes: &[u8], constraints: &Constraints) -> Result<Mended, MendError> {

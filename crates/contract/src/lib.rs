@@ -2,10 +2,12 @@
 //! May use: prost, pbjson, serde. Lives here: messages, their JSON, their validation.
 //! May not live here: HTTP, gRPC servers, geometry, anything that knows what a scan is.
 
+mod error_chain;
 mod json;
 pub mod port;
 mod validate;
 
+pub use error_chain::error_chain;
 pub use json::{JsonError, from_json};
 pub use validate::{Anchor, Constraints, Edit, FieldError, Gesture, HoleSelector, Search};
 

@@ -23,7 +23,8 @@ impl SharedMender {
     /// A scan, and how long reading it took.
     fn scan(&self, bytes: &[u8]) -> Result<(Scan, Duration), Refusal> {
         let started = Instant::now();
-        let scan = Scan::read(bytes, &self.0.scan_limits).map_err(|error| of_scan(&error))?;
+        let scan =
+            Scan::read(bytes.to_vec(), &self.0.scan_limits).map_err(|error| of_scan(&error))?;
         Ok((scan, started.elapsed()))
     }
 
@@ -154,7 +155,7 @@ fn of_scan(error: &ScanError) -> Refusal {
         ScanError::Limit { .. } => (Class::TooLarge, "scan_too_large"),
         ScanError::NoTriangles => (Class::Unprocessable, "no_triangles"),
         ScanError::Singular { .. } => (Class::Unprocessable, "singular_transform"),
-        ScanError::Addition { .. } => (Class::Internal, "internal"),
+        ScanError::InvalidPatch { .. } => (Class::Internal, "internal"),
     };
     Refusal {
         class,

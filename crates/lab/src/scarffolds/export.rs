@@ -5,8 +5,8 @@ use super::sheets::Sheet;
 use darn_geometry::mesh::curvature::vertex_normals;
 use darn_geometry::mesh::{TriMesh, Vec3};
 use darn_gltf_scan::ScanError;
-use darn_gltf_scan::export::{Fresh, glb};
-use darn_render::{Aim, CLOTH, Framing, Lines, View, picture};
+use darn_gltf_scan::export::{NewMesh, glb};
+use darn_render::{CLOTH, CameraDirection, EdgeLines, Framing, PictureOptions, picture};
 use image::RgbImage;
 
 /// Columns of a contact sheet.
@@ -27,7 +27,7 @@ pub fn as_glb(sheet: &Sheet, name: &str) -> Result<Vec<u8>, ScanError> {
     let texcoords: Vec<[f32; 2]> = (0..positions.len())
         .map(|k| [along(k % SIDE), 1.0 - along(k / SIDE)])
         .collect();
-    glb(&Fresh {
+    glb(&NewMesh {
         name,
         positions: &positions,
         normals: &normals,
@@ -40,14 +40,14 @@ pub fn as_glb(sheet: &Sheet, name: &str) -> Result<Vec<u8>, ScanError> {
 pub fn contact_sheet(sheets: &[&Sheet]) -> RgbImage {
     let rows = (sheets.len() as u32).div_ceil(COLUMNS).max(1);
     let mut all = RgbImage::new(COLUMNS * TILE[0], rows * TILE[1]);
-    let view = View {
+    let view = PictureOptions {
         size: TILE,
-        aim: Aim::Angles {
+        direction: CameraDirection::Angles {
             azimuth: 30.0,
             elevation: 35.0,
         },
         framing: Framing::Whole,
-        lines: Lines::Rims,
+        lines: EdgeLines::Rims,
     };
     for (place, sheet) in
         (0..rows * COLUMNS).zip(sheets.iter().map(Some).chain(std::iter::repeat(None)))
@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn what_is_high_in_the_simulation_is_high_in_the_scan() {
-        let scan = Scan::read(&as_glb(&ramp(), "ramp").unwrap(), &ScanLimits::default()).unwrap();
+        let scan = Scan::read(as_glb(&ramp(), "ramp").unwrap(), &ScanLimits::default()).unwrap();
         assert_eq!(scan.surface.faces.len(), 2 * (SIDE - 1) * (SIDE - 1));
         for (p, q) in scan.surface.positions.iter().zip(ramp().positions) {
             assert_eq!([p.x, p.y, p.z], [q[0], q[2], -q[1]].map(f64::from));

@@ -1,6 +1,8 @@
-//! Edits of a JSON text that leave every other character as it was: spelling of numbers, escapes, spaces, even doubled keys.
+//! Edits a JSON text and leaves every other character unchanged: spelling of numbers, escapes, spaces, even repeated
+//! keys.
 //!
-//! A round trip through `serde_json::Value` would not: even with arbitrary precision it writes `1E5` as `1e+5`.
+//! A round trip through `serde_json::Value` changes characters: even with arbitrary precision it writes `1E5` as
+//! `1e+5`.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -8,10 +10,10 @@ use std::ops::Range;
 use serde_json::Value;
 use serde_json::value::RawValue;
 
-use super::ScanError;
+use super::error::ScanError;
 
-/// A JSON object's text and the edits to make in it.
-pub(super) struct Splice<'t> {
+/// The text of a JSON object, and edits to make in it.
+pub(super) struct JsonEdit<'t> {
     text: &'t str,
     root: &'t str,
     /// Replacements in disjoint places; an empty range inserts.
@@ -20,8 +22,8 @@ pub(super) struct Splice<'t> {
     members: String,
 }
 
-impl<'t> Splice<'t> {
-    /// Takes a text that is known to parse.
+impl<'t> JsonEdit<'t> {
+    /// No edits yet. The text is known to parse.
     pub fn new(text: &'t [u8]) -> Result<Self, ScanError> {
         let invalid = || ScanError::Invalid {
             pointer: String::new(),
@@ -46,7 +48,7 @@ impl<'t> Splice<'t> {
         Ok(())
     }
 
-    /// Appends to the array at `path`; a missing one is made if it is a member of the root.
+    /// Appends to the array at `path`; a missing array is created if it is a member of the root.
     pub fn append(&mut self, path: &[&str], values: &[Value]) -> Result<(), ScanError> {
         let new = values
             .iter()
@@ -55,20 +57,20 @@ impl<'t> Splice<'t> {
             .join(",");
         match (self.find(path)?, path) {
             (Some(array), _) => {
-                let there: Vec<&RawValue> =
+                let old: Vec<&RawValue> =
                     serde_json::from_str(array).map_err(|_| invalid(path, "must be an array"))?;
-                let comma = if there.is_empty() { "" } else { "," };
+                let comma = if old.is_empty() { "" } else { "," };
                 let close = self.span(array).end.saturating_sub(1);
                 self.edits.push((close..close, format!("{comma}{new}")));
             }
-            // The root is not empty: it has an `asset`.
+            // The comma is right: the root is never empty, it has an `asset`.
             (None, [key]) => self.members.push_str(&format!(",\"{key}\":[{new}]")),
             (None, _) => return Err(invalid(path, "is missing")),
         }
         Ok(())
     }
 
-    /// The text with all edits made.
+    /// The edited text.
     pub fn finish(mut self) -> String {
         let close = self.span(self.root).end.saturating_sub(1);
         self.edits
@@ -99,7 +101,7 @@ impl<'t> Splice<'t> {
                     items.get(index).copied()
                 }
                 Err(_) => {
-                    // Of doubled keys the last counts, as it did in reading.
+                    // Of repeated keys the last one counts, as in reading.
                     let members: BTreeMap<String, &RawValue> =
                         serde_json::from_str(at).map_err(|_| invalid(here, "must be an object"))?;
                     members.get(*key).copied()
@@ -113,7 +115,7 @@ impl<'t> Splice<'t> {
         Ok(Some(at))
     }
 
-    /// Where a slice of the text lies in it.
+    /// The range of a slice of the text.
     fn span(&self, part: &str) -> Range<usize> {
         let start = (part.as_ptr() as usize).saturating_sub(self.text.as_ptr() as usize);
         start..start + part.len()
@@ -135,29 +137,23 @@ mod tests {
     #[test]
     fn only_the_edited_places_change() {
         let text = " { \"a\" : [ 1E5 , 2 ] ,\n\"b\":{\"c\": [],\"n\":1.0} , \"\\u0062\\u0062\":[{\"n\" :7}] } ";
-        let mut splice = Splice::new(text.as_bytes()).unwrap();
-        splice.append(&["a"], &[json!(3), json!({"x": 4})]).unwrap();
-        splice.append(&["b", "c"], &[json!(5)]).unwrap();
-        splice.replace(&["bb", "0", "n"], &json!(8)).unwrap();
-        splice.append(&["new"], &[json!(6)]).unwrap();
+        let mut edit = JsonEdit::new(text.as_bytes()).unwrap();
+        edit.append(&["a"], &[json!(3), json!({"x": 4})]).unwrap();
+        edit.append(&["b", "c"], &[json!(5)]).unwrap();
+        edit.replace(&["bb", "0", "n"], &json!(8)).unwrap();
+        edit.append(&["new"], &[json!(6)]).unwrap();
         assert_eq!(
-            splice.finish(),
+            edit.finish(),
             " { \"a\" : [ 1E5 , 2 ,3,{\"x\":4}] ,\n\"b\":{\"c\": [5],\"n\":1.0} , \"\\u0062\\u0062\":[{\"n\" :8}] ,\"new\":[6]} "
         );
     }
 
     #[test]
-    fn what_is_not_there_or_of_another_type_is_named() {
-        let mut splice = Splice::new(b"{\"a\":{}}").unwrap();
+    fn missing_and_mistyped_values_are_named() {
+        let mut edit = JsonEdit::new(b"{\"a\":{}}").unwrap();
+        assert_eq!(edit.append(&["a"], &[]).unwrap_err().pointer(), Some("/a"));
         assert_eq!(
-            splice.append(&["a"], &[]).unwrap_err().pointer(),
-            Some("/a")
-        );
-        assert_eq!(
-            splice
-                .replace(&["a", "b"], &json!(1))
-                .unwrap_err()
-                .pointer(),
+            edit.replace(&["a", "b"], &json!(1)).unwrap_err().pointer(),
             Some("/a/b")
         );
     }
