@@ -3,8 +3,6 @@
 //! No glTF, no files, no windows: the command decides what is drawn in which colour.
 
 mod camera;
-pub mod chart;
-mod letters;
 mod occlusion;
 mod outline;
 mod raster;
