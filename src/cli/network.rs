@@ -4,7 +4,7 @@ use super::failure::{Failure, OrFail};
 use super::files;
 use crate::settings::{Autodiff, Backend, NetworkArgs};
 #[cfg(feature = "burn")]
-use darn_lab::unet::{BackendKind, Settings, load_network};
+use darn_lab::unet::{BackendKind, BackendSettings, load_network};
 use darn_mend::NetworkMender;
 use darn_net::engine::EngineOptions;
 use darn_net::{NetError, Network, Networks};
@@ -94,7 +94,7 @@ fn loaded(bytes: &[u8], args: &NetworkArgs) -> Result<Network, NetError> {
         (Autodiff::Burn, BackendKind::Engine) => Some(BackendKind::Flex),
         _ => None,
     };
-    let settings = Settings {
+    let settings = BackendSettings {
         backend,
         autodiff,
         engine: options(),

@@ -11,8 +11,8 @@ use darn_geometry::mesh::weld::{WeldedMesh, weld};
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
 use darn_gltf_scan::Scan;
 use darn_gltf_scan::export::{NewMesh, glb};
-use darn_lab::scarffolds::scanned::{Hole, Scanned, scanned};
-use darn_lab::scarffolds::sheets::{self, Sheet};
+use darn_lab::scarffolds::holed_scan::{HoleShape, HoledScan, holed_scan};
+use darn_lab::scarffolds::sheets::{self, SimulatedSheet};
 use darn_mend::{MendError, NetworkMender, mend};
 use darn_net::engine::EngineOptions;
 use darn_net::{Network, Networks};
@@ -23,7 +23,7 @@ use rand_chacha::ChaCha8Rng;
 pub const WEIGHTS: &[u8] = include_bytes!("../../weights/standard.safetensors");
 
 /// A hole in the middle, a quarter of the sheet wide.
-pub const ROUND: Hole = Hole::Circle {
+pub const ROUND: HoleShape = HoleShape::Circle {
     centre: Vec2::new(0.5, 0.48),
     radius: 0.13,
 };
@@ -45,23 +45,23 @@ pub fn mender() -> &'static Arc<NetworkMender> {
 }
 
 /// Simulated sheets, made once for all tests.
-pub fn sheet(index: usize) -> &'static Sheet {
-    static SHEETS: OnceLock<Vec<Sheet>> = OnceLock::new();
+pub fn sheet(index: usize) -> &'static SimulatedSheet {
+    static SHEETS: OnceLock<Vec<SimulatedSheet>> = OnceLock::new();
     let make = || (0..3).map(|k| sheets::make(20, k).expect("a sheet").0);
     &SHEETS.get_or_init(|| make().collect())[index]
 }
 
 /// A sheet that `place` lays over (u, v) in the unit square.
-pub fn laid(place: impl Fn(f32, f32) -> [f32; 3]) -> Sheet {
+pub fn laid(place: impl Fn(f32, f32) -> [f32; 3]) -> SimulatedSheet {
     let at = |k: usize| place((k % 51) as f32 / 50.0, (k / 51) as f32 / 50.0);
-    Sheet {
+    SimulatedSheet {
         positions: (0..51 * 51).map(at).collect(),
     }
 }
 
 /// A sheet as a scan of about 45² vertices with a hole.
-pub fn holed(sheet: &Sheet, hole: &Hole) -> Scanned {
-    scanned(sheet, 45, hole, &mut ChaCha8Rng::seed_from_u64(5))
+pub fn holed(sheet: &SimulatedSheet, hole: &HoleShape) -> HoledScan {
+    holed_scan(sheet, 45, hole, &mut ChaCha8Rng::seed_from_u64(5))
 }
 
 /// A mesh as GLB; texture coordinates may be left empty.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use darn_contract::port::Cancellation;
 use darn_contract::{Anchor, Constraints, Edit, Gesture, Search};
 use darn_geometry::mesh::{Vec2, Vec3};
-use darn_lab::scarffolds::sheets::Sheet;
+use darn_lab::scarffolds::sheets::SimulatedSheet;
 use darn_mend::ScanSession;
 
 use super::cloth::{ROUND, holed, laid, mended, mender, packed, read, sheet};
@@ -23,7 +23,7 @@ struct Edited {
 }
 
 impl Edited {
-    fn of(sheet: &Sheet) -> Edited {
+    fn of(sheet: &SimulatedSheet) -> Edited {
         let scan = read(&packed(&holed(sheet, &ROUND).mesh, &[]));
         let session = ScanSession::open(
             scan,

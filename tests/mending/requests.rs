@@ -6,7 +6,7 @@ use darn_contract::port::Cancellation;
 use darn_contract::{Anchor, Constraints, Edit, Gesture, HoleSelector};
 use darn_geometry::mesh::intersect::intersections_with;
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
-use darn_lab::scarffolds::scanned::Hole;
+use darn_lab::scarffolds::holed_scan::HoleShape;
 use darn_mend::{Call, MendError, MendLimits, NetworkMender, mend};
 use darn_net::Networks;
 
@@ -91,7 +91,7 @@ fn the_outer_boundary_is_never_filled() {
 
 #[test]
 fn a_scan_without_holes_is_refused_and_its_loops_are_named() {
-    let none = Hole::Circle {
+    let none = HoleShape::Circle {
         centre: darn_geometry::mesh::Vec2::new(0.5, 0.5),
         radius: 0.0,
     };
@@ -122,7 +122,7 @@ fn drawn_twice(glb: &[u8], members: &[(&str, serde_json::Value)]) -> Vec<u8> {
 fn a_hole_between_two_nodes_of_one_mesh_is_left() {
     // Half a sheet, half of a hole on its edge; the other half is its mirror image.
     let half = laid(|u, v| [u, v, 0.02 * (9.0 * v).sin()]);
-    let cut = Hole::Circle {
+    let cut = HoleShape::Circle {
         centre: Vec2::new(0.0, 0.5),
         radius: 0.15,
     };

@@ -4,9 +4,7 @@
 //! what is drawn in which colour.
 
 mod camera;
-pub mod chart;
 mod face;
-mod letters;
 mod occlusion;
 mod options;
 mod outline;

@@ -1,4 +1,4 @@
-//! Laws of the room: backends agree, files round-trip or name what is wrong, fills are smooth, directions do not matter.
+//! Laws of the network in burn: backends agree, files round-trip or are refused by name, fills are smooth, rotations do not matter.
 
 use burn::backend::{Autodiff, Flex, NdArray};
 use burn::tensor::backend::{AutodiffBackend, Backend};
@@ -136,7 +136,7 @@ fn backends_agree_with_the_reference() {
         let silent = filled(&silent.unwrap(), &grids).unwrap();
         assert!(
             largest_distance(&silent[0], &answers[0][0]) > 0.01 * CELL,
-            "the network must have a say in this test"
+            "the network must matter in this test"
         );
     }
 }
@@ -169,7 +169,7 @@ fn convolution_gradients_agree_with_the_reference() {
         Tensor::<NdArray, 4>::random(shape, Distribution::Normal(0.0, 1.0), &Default::default())
             .into_data()
     };
-    // Images that go into products together (a group and a part of one), one by one, and sides that differ.
+    // Images that share products (a group and a part of one), images one by one, and images that are not square.
     for [count, from, to, height, width] in [[70, 3, 5, 4, 4], [2, 4, 3, 40, 40], [3, 2, 2, 5, 9]] {
         let (x, kernel) = (
             random([count, from, height, width]),
@@ -330,13 +330,13 @@ fn a_hole_in_a_plane_is_filled_with_the_plane() {
         }],
     )
     .unwrap();
-    // The sweeps stop short of convergence; the hole is 20 cells wide.
+    // The sweeps stop before they converge; the hole is 20 cells wide.
     let worst = largest_distance(&answer[0], &plane) / CELL;
     assert!(worst < 0.5, "{worst}");
 }
 
 #[test]
-fn what_stands_in_unknown_cells_does_not_matter() {
+fn positions_of_unknown_cells_do_not_matter() {
     let bytes = write(&tensors(CONFIG), &card(CONFIG)).unwrap();
     let network = load_network(&bytes, BackendKind::Flex).unwrap();
     let grid = bent(disk);
@@ -381,7 +381,7 @@ fn the_fill_turns_with_the_cloth() {
 }
 
 #[test]
-fn a_network_that_is_told_where_up_is_turns_the_fill_about_it_only() {
+fn a_network_with_an_up_direction_turns_the_fill_about_it_only() {
     let about_up = Vector3::new(0.0, 0.0, 1.3);
     assert!(off_the_turned_fill(FrameKind::Hanging, about_up) < 1e-3 * CELL);
     let over = Vector3::new(1.3, 0.0, 0.0);

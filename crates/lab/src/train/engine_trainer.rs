@@ -1,33 +1,44 @@
-//! Training steps by darn's own engine: its kernels for the network, the loss's derivatives written out. The loss's means are over the few
-//! grids that go through the kernels together, not over the batch.
+//! Training steps by the engine of `darn-net`: its kernels for the network, [`super::loss_gradient`] for the loss. Batch norm keeps its
+//! statistics. The means of the loss are over the few grids that go through the kernels together, not over the batch.
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::batch::{Batch, Prepared};
+use super::batch::{PreparedSample, TrainingBatch};
+use super::error::TrainError;
+use super::loss_gradient::loss_and_gradient;
 use super::optimiser::{BETA1, BETA2, CLIP, DECAY, EPSILON, share_kept};
-use super::slopes::slopes;
-use super::student::{Learned, Snapshot, Student};
-use super::{TrainError, TrainOptions};
+use super::options::TrainOptions;
+use super::snapshot::TrainSnapshot;
+use super::trainer::{StepOutcome, Trainer};
 use darn_geometry::grid::CELLS;
 use darn_net::engine::{Engine, EngineError, EngineOptions, Input, Lessons, Scratch};
 use darn_net::weights::NamedTensors;
 use darn_net::{UnetConfig, cells};
 
-/// A network by its tensors, with its optimiser.
+/// The tensors of a network, with their optimiser.
 #[derive(Debug)]
-pub struct Engined {
+pub(super) struct EngineTrainer {
     config: UnetConfig,
     network: NamedTensors,
     averaged: NamedTensors,
-    /// By trained tensor, in the order of their names.
+    /// First and second moments by trained tensor, in the order of the names.
     moments: Vec<[Vec<f32>; 2]>,
     step: u64,
     lessons: Lessons,
 }
 
-impl Engined {
+/// A tensor of a step.
+struct TrainedTensor<'a> {
+    values: &'a mut [f32],
+    gradient: &'a [f32],
+    moments: &'a mut [Vec<f32>; 2],
+    /// Factor that the values shrink by.
+    decay: f32,
+}
+
+impl EngineTrainer {
     fn engine(&self, tensors: &NamedTensors) -> Result<Engine, EngineError> {
         let options = EngineOptions {
             threads: rayon::current_num_threads(),
@@ -36,7 +47,7 @@ impl Engined {
         Engine::new(tensors, &self.config, options)
     }
 
-    fn input<'a>(&self, batch: &'a Batch) -> Input<'a> {
+    fn input<'a>(&self, batch: &'a TrainingBatch) -> Input<'a> {
         Input {
             positions: &batch.positions,
             known: &batch.known,
@@ -45,14 +56,14 @@ impl Engined {
         }
     }
 
-    /// AdamW on all tensors that have a gradient; returns the gradient's norm before clipping.
+    /// One AdamW step on all tensors that have a gradient; returns the norm of the gradient before clipping.
     fn descend(&mut self, gradient: &NamedTensors, rate: f64) -> f64 {
         self.step += 1;
         let squares = gradient.par_iter().map(|(_, (_, values))| {
             let squares = values.iter().map(|x| f64::from(*x).powi(2));
             squares.sum::<f64>()
         });
-        // In the order of names: a parallel sum's order would depend on the threads.
+        // Summed in the order of the names: the order of a parallel sum would depend on the threads.
         let norm = squares.collect::<Vec<_>>().iter().sum::<f64>().sqrt();
         let clip = if norm > CLIP { CLIP / norm } else { 1.0 } as f32;
         if self.moments.is_empty() {
@@ -65,27 +76,36 @@ impl Engined {
         let (beta1, beta2) = (BETA1 as f32, BETA2 as f32);
         let trained = self.network.iter_mut();
         let trained = trained.filter(|(name, _)| gradient.contains_key(*name));
-        let tensors: Vec<_> = trained.zip(gradient).zip(&mut self.moments).collect();
-        tensors.into_par_iter().for_each(
-            |(((_, (shape, values)), (_, (_, by))), [first, second])| {
-                let decay = if shape.len() > 1 {
+        let pairs = trained.zip(gradient.values()).zip(&mut self.moments);
+        let tensors: Vec<TrainedTensor> = pairs
+            .map(|(((_, tensor), by), moments)| TrainedTensor {
+                // Kernels decay, vectors do not.
+                decay: if tensor.0.len() > 1 {
                     1.0 - rate * DECAY
                 } else {
                     1.0
-                } as f32;
-                let moments = first.iter_mut().zip(second);
-                for ((x, by), (first, second)) in values.iter_mut().zip(by).zip(moments) {
-                    let by = by * clip;
-                    *first = *first * beta1 + by * (1.0 - beta1);
-                    *second = *second * beta2 + by * by * (1.0 - beta2);
-                    let change = scale1 * *first / ((*second * scale2).sqrt() + EPSILON as f32);
-                    *x = *x * decay - change;
-                }
-            },
-        );
+                } as f32,
+                values: &mut tensor.1,
+                gradient: &by.1,
+                moments,
+            })
+            .collect();
+        tensors.into_par_iter().for_each(|tensor| {
+            let [first, second] = tensor.moments;
+            let moments = first.iter_mut().zip(second);
+            let values = tensor.values.iter_mut().zip(tensor.gradient);
+            for ((x, by), (first, second)) in values.zip(moments) {
+                let by = by * clip;
+                *first = *first * beta1 + by * (1.0 - beta1);
+                *second = *second * beta2 + by * by * (1.0 - beta2);
+                let change = scale1 * *first / ((*second * scale2).sqrt() + EPSILON as f32);
+                *x = *x * tensor.decay - change;
+            }
+        });
         norm
     }
 
+    /// Moves the averaged tensors towards the current ones.
     fn average(&mut self) {
         let keep = share_kept(self.step) as f32;
         let pairs = self.averaged.iter_mut().zip(self.network.iter());
@@ -99,15 +119,15 @@ impl Engined {
     }
 }
 
-impl Student for Engined {
-    fn of(snapshot: Snapshot, options: &TrainOptions) -> Result<Self, TrainError> {
+impl Trainer for EngineTrainer {
+    fn of(snapshot: TrainSnapshot, options: &TrainOptions) -> Result<Self, TrainError> {
         if snapshot.step == 0 && options.from.is_none() {
             return Err(TrainError::Options(
                 "the engine keeps the statistics of batch norm: it needs weights to start from"
                     .into(),
             ));
         }
-        Ok(Engined {
+        Ok(EngineTrainer {
             config: options.network,
             network: snapshot.network,
             averaged: snapshot.averaged,
@@ -119,34 +139,35 @@ impl Student for Engined {
 
     fn step(
         &mut self,
-        batch: Batch,
+        batch: TrainingBatch,
         options: &TrainOptions,
         rate: f64,
-    ) -> Result<Learned, TrainError> {
+    ) -> Result<StepOutcome, TrainError> {
         let engine = self.engine(&self.network)?;
         let input = self.input(&batch);
         let count = batch.count;
         let lesson = |grids: Range<usize>, predictions: &[f32], by: &mut [f32]| {
             let share = grids.len() as f32 / count as f32;
-            let said = slopes(predictions, &batch.part(grids), &options.loss, by);
+            let terms = loss_and_gradient(predictions, &batch.part(grids), &options.loss, by);
             by.iter_mut().for_each(|x| *x *= share);
-            said.map(|term| term * share)
+            terms.scaled(share)
         };
         let lessons = &mut self.lessons;
-        let (gradient, said) = engine.learn(lessons, &self.network, input, &lesson)?;
-        let sum = |term: usize| said.iter().map(|terms| terms[term]).sum();
-        let terms = std::array::from_fn(sum);
+        let (gradient, terms) = engine.learn(lessons, &self.network, input, &lesson)?;
         let norm = self.descend(&gradient, rate);
         self.average();
-        Ok((terms, norm))
+        Ok(StepOutcome {
+            loss: terms.into_iter().sum(),
+            norm,
+        })
     }
 
     fn steps(&self) -> u64 {
         self.step
     }
 
-    fn snapshot(&self) -> Snapshot {
-        Snapshot {
+    fn snapshot(&self) -> TrainSnapshot {
+        TrainSnapshot {
             network: self.network.clone(),
             averaged: self.averaged.clone(),
             moments: self.moments.clone(),
@@ -154,9 +175,9 @@ impl Student for Engined {
         }
     }
 
-    fn predictions(&self, samples: &[Prepared]) -> Result<Vec<Vec<[f32; 3]>>, TrainError> {
+    fn predictions(&self, samples: &[PreparedSample]) -> Result<Vec<Vec<[f32; 3]>>, TrainError> {
         let engine = self.engine(&self.averaged)?;
-        let batch = Batch::of(samples);
+        let batch = TrainingBatch::of(samples);
         let input = self.input(&batch);
         let mut out = vec![0.0; batch.positions.len()];
         engine.predict(&mut Scratch::default(), input, &mut out)?;

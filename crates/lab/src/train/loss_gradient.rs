@@ -1,28 +1,32 @@
-//! The loss of [`super::loss`] and its derivatives with respect to a prediction, written out on plain slices: what burn's autodiff gives,
-//! for the trainer that has no tensors. It takes no locks, so that it may run on the pool's threads.
+//! The loss of [`super::loss`] and its derivatives with respect to a prediction, written out on plain slices, for the engine's trainer. A
+//! test holds both against burn's autodiff. No locks are taken, so it may run on the threads of a pool.
 
-use super::batch::Batch;
-use super::loss::{DATA_BEND, GRADIENT_BEND, LENGTH_GUARD, LossKind, LossWeights};
-use super::near::{REACH, near_pairs};
+use super::batch::TrainingBatch;
+use super::loss::{DATA_BEND, GRADIENT_BEND, LENGTH_GUARD, LossKind, LossTerms, LossWeights};
+use super::near_pairs::{REACH, near_pairs};
 use darn_geometry::grid::{CELLS, SIDE};
 
-/// A place or a difference of places, in cells.
+/// A position or a difference of positions, in cells.
 type Vector = [f32; 3];
 
-/// The loss of predictions `[n, 3, 64, 64]` of a batch of n, then its terms as [`super::loss::Loss`] has them; `by` gets the derivatives.
-pub fn slopes(
+/// The loss of predictions `[n, 3, 64, 64]` of a batch of n; writes its derivatives with respect to them into `by`.
+pub(super) fn loss_and_gradient(
     predictions: &[f32],
-    batch: &Batch,
+    batch: &TrainingBatch,
     weights: &LossWeights,
     by: &mut [f32],
-) -> [f32; 5] {
-    let grids: Vec<Grid> = (0..batch.count)
-        .map(|grid| Grid::of(grid, predictions, batch))
+) -> LossTerms {
+    let grids: Vec<SampleGrid> = (0..batch.count)
+        .map(|grid| SampleGrid::of(grid, predictions, batch))
         .collect();
     let share = |of: &[f32]| 1.0 / of.iter().sum::<f32>().max(1e-6);
-    let [of_cell, of_u, of_v] = [&batch.weight, &batch.pairs_u, &batch.pairs_v].map(|w| share(w));
+    let (of_cell, of_u, of_v) = (
+        share(&batch.weight),
+        share(&batch.pairs_u),
+        share(&batch.pairs_v),
+    );
     let holes = batch.hole.iter().filter(|h| **h > 0.0).count().max(1) as f32;
-    let [mut data, mut gradient, mut stretch, mut repulsion] = [0.0; 4];
+    let (mut data, mut gradient, mut stretch, mut repulsion) = (0.0, 0.0, 0.0, 0.0);
     for (number, grid) in grids.iter().enumerate() {
         let mut slope = vec![[0.0; 3]; CELLS];
         for (cell, weight) in grid.weight.iter().enumerate() {
@@ -30,7 +34,7 @@ pub fn slopes(
             data += value * weight * of_cell;
             add(&mut slope[cell], by, weight * of_cell);
         }
-        // What follows sees the error in the hole alone: known cells keep the scan's positions.
+        // The other terms use the error in the hole only: known cells keep the positions of the scan.
         let mut by_composed = vec![[0.0; 3]; CELLS];
         let along_u = grid.pairs_u.iter().enumerate().map(|(k, weight)| {
             let cell = k / (SIDE - 1) * SIDE + k % (SIDE - 1);
@@ -70,11 +74,17 @@ pub fn slopes(
         + gradient * weights.gradient as f32
         + stretch * weights.stretch as f32
         + repulsion * weights.self_penetration as f32;
-    [total, data, gradient, stretch, repulsion]
+    LossTerms {
+        total,
+        data,
+        gradient,
+        stretch,
+        self_penetration: repulsion,
+    }
 }
 
 /// One sample, in cells.
-struct Grid<'a> {
+struct SampleGrid<'a> {
     truth: Vec<Vector>,
     /// Predicted minus true.
     error: Vec<Vector>,
@@ -88,8 +98,8 @@ struct Grid<'a> {
 /// Pairs of neighbours along one axis.
 const PAIRS: usize = SIDE * (SIDE - 1);
 
-impl<'a> Grid<'a> {
-    fn of(grid: usize, predictions: &[f32], batch: &'a Batch) -> Grid<'a> {
+impl<'a> SampleGrid<'a> {
+    fn of(grid: usize, predictions: &[f32], batch: &'a TrainingBatch) -> SampleGrid<'a> {
         let vectors = |planes: &[f32]| -> Vec<Vector> {
             let planes = &planes[grid * 3 * CELLS..];
             let at = |cell: usize| [0, 1, 2].map(|axis| planes[axis * CELLS + cell] * SIDE as f32);
@@ -97,7 +107,7 @@ impl<'a> Grid<'a> {
         };
         let (truth, said) = (vectors(&batch.truth), vectors(predictions));
         let part = |values: &'a [f32], size: usize| &values[grid * size..(grid + 1) * size];
-        Grid {
+        SampleGrid {
             error: said
                 .into_iter()
                 .zip(&truth)
@@ -115,7 +125,7 @@ impl<'a> Grid<'a> {
         self.error[cell].map(|x| x * self.hole[cell])
     }
 
-    /// Σ (reach − d)² over near pairs of the composed grid; its derivatives, times a weight, are added to `by`.
+    /// Σ (reach − d)² over near pairs of the composed grid; adds its derivatives, times `weight`, to `by`.
     fn repelled(&self, weight: f32, by: &mut [Vector]) -> f32 {
         let place = |cell: usize| -> Vector {
             let error = self.hole_error(cell);
@@ -139,7 +149,7 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// ‖x‖², or √(‖x‖² + δ²) − δ, and its derivative.
+/// The penalty ‖x‖² or √(‖x‖² + δ²) − δ, and its derivative.
 fn counted(x: Vector, kind: LossKind, bend: f32) -> (f32, Vector) {
     match kind {
         LossKind::Squared => (squared(x), x.map(|x| 2.0 * x)),
@@ -170,17 +180,16 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::super::batch::prepare;
-    use super::super::loss::{Target, loss};
-    use super::super::student::{numbers, terms};
+    use super::super::loss::{LossTarget, loss};
     use super::*;
-    use crate::scarffolds::samples::Sample;
+    use crate::scarffolds::samples::TrainingSample;
     use darn_geometry::grid::cell_centre;
     use darn_net::UnetConfig;
 
     type Auto = Autodiff<Flex>;
 
     /// A bent sheet with a hole between two columns and rows; its last rows are not there.
-    fn sample(first: usize, last: usize) -> Sample {
+    fn sample(first: usize, last: usize) -> TrainingSample {
         let within =
             |k: usize| (first..last).contains(&(k % SIDE)) && (first..last).contains(&(k / SIDE));
         let hole: Vec<bool> = (0..CELLS).map(within).collect();
@@ -190,7 +199,7 @@ mod tests {
             [p.x, p.y, 0.1 * (7.0 * p.x).sin()]
         };
         let both = hole.iter().zip(&valid);
-        Sample {
+        TrainingSample {
             known: both.map(|(hole, valid)| *valid && !hole).collect(),
             truth: (0..CELLS)
                 .map(|k| if valid[k] { bent(k) } else { [0.0; 3] })
@@ -201,16 +210,16 @@ mod tests {
     }
 
     #[test]
-    fn slopes_are_what_autodiff_gives() {
+    fn the_derivatives_are_those_of_autodiff() {
         let prepared = [sample(10, 40), sample(25, 31)]
             .map(|sample| prepare(&sample, &UnetConfig::default()).unwrap());
-        let batch = Batch::of(&prepared);
+        let batch = TrainingBatch::of(&prepared);
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let mut shaken = |amount: f32| -> Vec<f32> {
             let off = |x: &f32| x + rng.random_range(-amount..amount) / SIDE as f32;
             batch.truth.iter().map(off).collect()
         };
-        // Near enough to cloth, and so far off that layers repel each other.
+        // Small errors, and errors so large that layers repel each other.
         for (answer, repelled) in [(shaken(0.5), false), (shaken(6.0), true)] {
             for kind in [LossKind::Softened, LossKind::Squared] {
                 let weights = LossWeights {
@@ -219,22 +228,30 @@ mod tests {
                     ..LossWeights::default()
                 };
                 let mut by = vec![f32::NAN; answer.len()];
-                let found = slopes(&answer, &batch, &weights, &mut by);
+                let terms = loss_and_gradient(&answer, &batch, &weights, &mut by);
+                let found = [
+                    terms.total,
+                    terms.data,
+                    terms.gradient,
+                    terms.stretch,
+                    terms.self_penetration,
+                ];
 
                 let device = Default::default();
                 let shape = [batch.count, 3, SIDE, SIDE];
                 let input =
                     Tensor::<Auto, 4>::from_data(TensorData::new(answer.clone(), shape), &device)
                         .require_grad();
-                let target = Target::of(batch.clone(), &device);
+                let target = LossTarget::of(batch.clone(), &device);
                 let wanted = loss(input.clone(), &target, &weights);
-                for (found, wanted) in found.iter().zip(numbers::<_, 5>(terms(&wanted))) {
+                let stacked: Vec<f32> = wanted.stacked().into_data().into_vec().unwrap();
+                for (found, wanted) in found.iter().zip(stacked) {
                     assert!(
                         (found - wanted).abs() <= 1e-4 * wanted.abs(),
                         "{found} {wanted}"
                     );
                 }
-                assert_eq!(found[4] > 0.0, repelled);
+                assert_eq!(terms.self_penetration > 0.0, repelled);
                 let gradients = wanted.total.backward();
                 let wanted = input.grad(&gradients).unwrap().into_data();
                 let wanted: Vec<f32> = wanted.into_vec().unwrap();

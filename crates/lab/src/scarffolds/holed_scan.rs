@@ -1,16 +1,16 @@
-//! A sheet as a scanner would see it: an irregular triangle mesh with a hole in it, and what was cut out.
-//! For the example scan, the tests and the held-out tables; the network never trains on these.
+//! A sheet as a scanner would deliver it: an irregular triangle mesh with a hole, and the cloth that was cut out. For the example scan, the
+//! tests and the evaluation; the network is not trained on these.
 
 use rand::Rng;
 use spade::{DelaunayTriangulation, Point2, Triangulation as _};
 
-use super::sheets::Sheet;
-use super::spline::Spline;
+use super::sheet::SimulatedSheet;
+use super::spline::SheetSpline;
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
 
 /// The shape of a hole on the unit square.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Hole {
+pub enum HoleShape {
     /// A disk.
     Circle {
         /// Its centre.
@@ -38,10 +38,10 @@ pub enum Hole {
     },
 }
 
-/// A mesh with a hole and what was in it.
+/// A mesh with a hole, and the cloth that was in the hole.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Scanned {
-    /// The cloth that is left.
+pub struct HoledScan {
+    /// The remaining cloth.
     pub mesh: TriMesh,
     /// Rest coordinates of its vertices in the unit square.
     pub rest: Vec<Vec2>,
@@ -49,9 +49,14 @@ pub struct Scanned {
     pub lost: TriMesh,
 }
 
-/// Meshes a sheet with about `side`² jittered vertices and cuts the hole out.
-pub fn scanned(sheet: &Sheet, side: usize, hole: &Hole, rng: &mut impl Rng) -> Scanned {
-    let spline = Spline::new(sheet);
+/// Meshes a sheet with about `side`² jittered vertices and cuts the hole out. `rng` draws the vertices and the ragged edge.
+pub fn holed_scan(
+    sheet: &SimulatedSheet,
+    side: usize,
+    hole: &HoleShape,
+    rng: &mut impl Rng,
+) -> HoledScan {
+    let spline = SheetSpline::new(sheet);
     let (rest, faces) = irregular(side, rng);
     let positions: Vec<Vec3> = rest
         .iter()
@@ -61,12 +66,12 @@ pub fn scanned(sheet: &Sheet, side: usize, hole: &Hole, rng: &mut impl Rng) -> S
         std::array::from_fn(|_| [rng.random_range(-0.3..0.3), rng.random_range(-0.3..0.3)]);
     let gone = |f: &[u32; 3]| {
         let centre = f.iter().map(|v| rest[*v as usize]).sum::<Vec2>() / 3.0;
-        inside(hole, &ragged, centre)
+        in_hole(hole, &ragged, centre)
     };
     let (lost, kept): (Vec<[u32; 3]>, Vec<[u32; 3]>) = faces.into_iter().partition(gone);
     let (mesh, used) = compact(&positions, &kept);
     let (lost, _) = compact(&positions, &lost);
-    Scanned {
+    HoledScan {
         mesh,
         rest: used.into_iter().map(|v| rest[v as usize]).collect(),
         lost,
@@ -93,7 +98,7 @@ fn irregular(side: usize, rng: &mut impl Rng) -> (Vec<Vec2>, Vec<[u32; 3]>) {
     }
     let mut triangulation = DelaunayTriangulation::<Point2<f64>>::new();
     for p in &points {
-        // Finite and within the unit square: never refused.
+        // Points that are finite and within the unit square are never refused.
         let _ = triangulation.insert(Point2::new(p.x, p.y));
     }
     let at: Vec<Vec2> = triangulation
@@ -107,10 +112,11 @@ fn irregular(side: usize, rng: &mut impl Rng) -> (Vec<Vec2>, Vec<[u32; 3]>) {
     (at, faces)
 }
 
-fn inside(hole: &Hole, ragged: &[[f64; 2]; 6], p: Vec2) -> bool {
+/// Whether a point of the unit square lies in the hole; `ragged` holds the cosine and sine amplitudes of a blob's edge.
+fn in_hole(hole: &HoleShape, ragged: &[[f64; 2]; 6], p: Vec2) -> bool {
     match *hole {
-        Hole::Circle { centre, radius } => (p - centre).norm() < radius,
-        Hole::Blob { centre, radius } => {
+        HoleShape::Circle { centre, radius } => (p - centre).norm() < radius,
+        HoleShape::Blob { centre, radius } => {
             let d = p - centre;
             let angle = d.y.atan2(d.x);
             let waves = ragged.iter().zip(1..).map(|([a, b], k)| {
@@ -118,7 +124,7 @@ fn inside(hole: &Hole, ragged: &[[f64; 2]; 6], p: Vec2) -> bool {
             });
             d.norm() < radius * (1.0 + waves.sum::<f64>()).max(0.3)
         }
-        Hole::Slit {
+        HoleShape::Slit {
             centre,
             length,
             width,
@@ -130,7 +136,7 @@ fn inside(hole: &Hole, ragged: &[[f64; 2]; 6], p: Vec2) -> bool {
     }
 }
 
-/// The faces with only the vertices they use, and which those were.
+/// The mesh of some faces with the vertices they use, and the old indices of these vertices.
 fn compact(positions: &[Vec3], faces: &[[u32; 3]]) -> (TriMesh, Vec<u32>) {
     let mut place = vec![u32::MAX; positions.len()];
     let mut used = Vec::new();

@@ -1,30 +1,31 @@
-//! Which cells of a composed grid are near in space but not on the sheet: what the self-penetration loss looks at.
-//! Found on the CPU by a spatial hash, so that the loss costs as much as there is to repel, not all pairs of cells.
+//! Cells of a composed grid that are near in space but not on the sheet, for the self-penetration loss. A spatial hash on the CPU finds them,
+//! so the cost grows with the number of near pairs and not with all pairs of cells.
 
 use std::collections::HashMap;
 
 use darn_geometry::grid::{CELLS, SIDE};
 
 /// Distance below which two cells repel each other, in cells: balls of half the mean spacing touch.
-pub const REACH: f32 = 1.0;
-/// Cells no farther apart than this on the grid, along u and along v, are one piece of cloth and do not repel.
-pub const NEIGHBOURS: usize = 3;
-/// Most pairs of one grid: a crumpled prediction has them by the hundred thousand.
+pub(super) const REACH: f32 = 1.0;
+/// Cells at most this far apart on the grid along u and along v are one piece of cloth and do not repel.
+const NEIGHBOURS: usize = 3;
+/// Most pairs of one grid; a crumpled prediction can have hundreds of thousands.
 const MOST: usize = 8192;
 
 /// Pairs of cells of one grid.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct NearPairs {
+pub(super) struct NearPairs {
     /// The cells, lower index first, in ascending order.
     pub pairs: Vec<(usize, usize)>,
-    /// How many pairs each of them stands for: 1 unless there were more than are kept.
+    /// Number of found pairs that each kept pair stands for: 1 unless more than [`MOST`] were found.
     pub each: f32,
 }
 
-/// Pairs of `present` cells nearer than [`REACH`] in space, farther than [`NEIGHBOURS`] on the grid, at least one of them `open`.
+/// Pairs of `present` cells that are nearer than [`REACH`] in space and farther than [`NEIGHBOURS`] on the grid, at least one of them
+/// `open`.
 ///
 /// `positions` are in cells, all three lists `CELLS` long. The same input gives the same pairs.
-pub fn near_pairs(positions: &[[f32; 3]], present: &[bool], open: &[bool]) -> NearPairs {
+pub(super) fn near_pairs(positions: &[[f32; 3]], present: &[bool], open: &[bool]) -> NearPairs {
     let bucket = |p: &[f32; 3]| p.map(|x| (x / REACH).floor() as i32);
     let mut buckets: HashMap<[i32; 3], Vec<usize>> = HashMap::new();
     for k in (0..CELLS).filter(|&k| present[k]) {
@@ -37,7 +38,7 @@ pub fn near_pairs(positions: &[[f32; 3]], present: &[bool], open: &[bool]) -> Ne
             let beside = [step % 3, step / 3 % 3, step / 9];
             let at = [0, 1, 2].map(|axis| home[axis].saturating_add(beside[axis] - 1));
             for &b in buckets.get(&at).into_iter().flatten() {
-                // A pair of two open cells is met from both ends.
+                // A pair of two open cells is found from both ends.
                 let counted = !open[b] || a < b;
                 if counted
                     && !neighbours(a, b)
@@ -115,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn a_crumpled_grid_is_sampled_and_none_of_it_is_lost() {
+    fn pairs_of_a_crumpled_grid_are_thinned_and_stand_for_all() {
         let found = near_pairs(&vec![[0.2; 3]; CELLS], &[true; CELLS], &[true; CELLS]);
         assert_eq!(found.pairs.len(), MOST);
         let all = (0..CELLS).flat_map(|a| (a + 1..CELLS).map(move |b| (a, b)));

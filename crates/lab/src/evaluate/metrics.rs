@@ -1,4 +1,4 @@
-//! A filled grid against the truth: position, direction, amount of cloth, developability, cuts.
+//! Metrics of a filled grid against the truth: position, direction, amount of cloth, developability, self-intersections.
 
 use std::f64::consts::TAU;
 
@@ -8,38 +8,39 @@ use darn_geometry::grid::{CELLS, SIDE, Spacing, spacing};
 use darn_geometry::mesh::intersect::intersections_with;
 use darn_geometry::mesh::{TriMesh, Vec3};
 
-use super::Case;
+use super::cases::EvaluationCase;
+use crate::cell_normals::{neighbours, normal};
 
-/// One fill of one case in numbers.
+/// The metrics of one fill of one case.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct Measures {
+pub struct FillMetrics {
     /// Root mean square distance to the truth over hole cells, in cells.
     pub rmse: f64,
     /// Mean angle to the true normals in hole cells, degrees.
     pub normal: f64,
-    /// Mean distance of neighbours that touch the hole, in the paper's units: 1/64 is the truth.
+    /// Mean distance of neighbours that touch the hole, in the paper's units; the truth is 1/64.
     pub spacing_mean: f64,
-    /// Its variance, the same units squared.
+    /// Variance of these distances, the same units squared.
     pub spacing_variance: f64,
     /// Area of the hole's cells ÷ the truth's.
     pub area: f64,
     /// Mean absolute angle defect of hole cells, radians: Gaussian curvature × a cell's area.
     pub curvature: f64,
-    /// Pairs of triangles that cut each other, at least one of them touching the hole.
+    /// Pairs of triangles that intersect, at least one of them touching the hole.
     pub self_intersections: f64,
 }
 
-/// A fill's numbers, and the angle defect of every hole cell for histograms.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Measured {
-    /// The numbers.
-    pub measures: Measures,
+/// The metrics of a fill, and the angle defects of its hole cells for histograms.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Measurement {
+    /// The metrics.
+    pub metrics: FillMetrics,
     /// Angle defects of the hole's cells, radians.
     pub defects: Vec<f64>,
 }
 
-/// Measures a composed grid (known cells as given, hole cells filled; one position per cell) against the case's truth.
-pub fn measure(case: &Case, composed: &[Vec3]) -> Measured {
+/// Measures a composed grid (known cells as observed, hole cells filled; one position per cell) against the truth of the case.
+pub(super) fn measure(case: &EvaluationCase, composed: &[Vec3]) -> Measurement {
     let sample = &case.sample;
     let present: Vec<bool> = (0..CELLS)
         .map(|k| sample.known[k] || sample.hole[k])
@@ -66,37 +67,21 @@ pub fn measure(case: &Case, composed: &[Vec3]) -> Measured {
         .filter_map(|&k| defect(composed, &present, k))
         .collect();
     let curvature = defects.iter().map(|d| d.abs()).sum::<f64>() / defects.len().max(1) as f64;
-    Measured {
-        measures: Measures {
+    Measurement {
+        metrics: FillMetrics {
             rmse: (squares / open.len().max(1) as f64).sqrt() * SIDE as f64,
             normal: angle / count.max(1) as f64,
             spacing_mean: mean,
             spacing_variance: variance,
             area: areas[0] / areas[1].max(f64::MIN_POSITIVE),
             curvature,
-            self_intersections: cuts(composed, &present, &sample.hole) as f64,
+            self_intersections: self_intersections(composed, &present, &sample.hole) as f64,
         },
         defects,
     }
 }
 
-/// The four neighbours of a cell, counter-clockwise from the right one; `None` at the border and where one is absent.
-fn neighbours(present: &[bool], k: usize) -> Option<[usize; 4]> {
-    let (i, j) = (k % SIDE, k / SIDE);
-    if i == 0 || j == 0 || i + 1 == SIDE || j + 1 == SIDE {
-        return None;
-    }
-    let all = [k + 1, k + SIDE, k - 1, k - SIDE];
-    all.iter().all(|&n| present[n]).then_some(all)
-}
-
-/// Cross product of the central differences.
-fn normal(x: &[Vec3], present: &[bool], k: usize) -> Option<Vec3> {
-    let [right, upper, left, lower] = neighbours(present, k)?;
-    Some((x[right] - x[left]).cross(&(x[upper] - x[lower])))
-}
-
-/// 2π minus the angles of the four triangles between a cell and its neighbours.
+/// Angle defect of a cell: 2π minus the angles of the four triangles between it and its neighbours.
 fn defect(x: &[Vec3], present: &[bool], k: usize) -> Option<f64> {
     let spokes = neighbours(present, k)?.map(|n| x[n] - x[k]);
     let angles = (0..4).map(|n| {
@@ -106,8 +91,8 @@ fn defect(x: &[Vec3], present: &[bool], k: usize) -> Option<f64> {
     Some(TAU - angles.sum::<f64>())
 }
 
-/// Cuts between the grid's triangles, those touching the hole against all.
-fn cuts(x: &[Vec3], present: &[bool], hole: &[bool]) -> usize {
+/// Intersecting pairs of the grid's triangles, at least one of each pair touching the hole.
+fn self_intersections(x: &[Vec3], present: &[bool], hole: &[bool]) -> usize {
     let mesh = TriMesh {
         positions: x.to_vec(),
         faces: faces(present),
@@ -119,13 +104,13 @@ fn cuts(x: &[Vec3], present: &[bool], hole: &[bool]) -> usize {
     intersections_with(&mesh, &own).len()
 }
 
-/// Two triangles for every square of four admitted cells.
-pub(super) fn faces(admitted: &[bool]) -> Vec<[u32; 3]> {
+/// Two triangles for every square of four present cells.
+pub(super) fn faces(present: &[bool]) -> Vec<[u32; 3]> {
     let squares = (0..CELLS - SIDE).filter(|k| k % SIDE + 1 < SIDE);
     let whole = squares.filter(|&k| {
         [k, k + 1, k + SIDE, k + SIDE + 1]
             .iter()
-            .all(|&c| admitted[c])
+            .all(|&c| present[c])
     });
     let split = |k: usize| {
         let [a, b, c, d] = [k, k + 1, k + SIDE, k + SIDE + 1].map(|c| c as u32);

@@ -1,24 +1,21 @@
-//! Prepared samples as records of bytes, for a trainer outside this program (`scripts/gpu`): little-endian, one after another, no header.
+//! Prepared samples as binary records for a trainer outside this program (`scripts/gpu`): little-endian, one after another, no header.
 //!
 //! | bytes | what |
 //! |---|---|
-//! | 3·4096·4 | what the network sees, `[3, 64, 64]` f32: known positions, and the plate under the rest |
+//! | 3·4096·4 | the network's input, `[3, 64, 64]` f32: known positions, and the plate in the other cells |
 //! | 3·4096·4 | the truth, `[3, 64, 64]` f32; zero where there is none |
-//! | 3·4 | where up is, f32 |
-//! | 4096 | flags of the cells: 1 known, 2 hole, 4 valid |
+//! | 3·4 | the up direction, f32 |
+//! | 4096 | flags of each cell: 1 known, 2 hole, 4 valid |
 
-use super::batch::{Batch, Prepared};
+use super::batch::{PreparedSample, TrainingBatch};
 use darn_geometry::grid::CELLS;
 use darn_net::InputKind;
 use darn_net::engine::{Input, seen};
 
-/// Bytes of one record.
-pub const RECORD: usize = 2 * 3 * CELLS * 4 + 3 * 4 + CELLS;
-
-/// Appends the records of samples.
-pub fn write(samples: &[Prepared], records: &mut Vec<u8>) {
+/// Appends the records of `samples` to `records`.
+pub fn write(samples: &[PreparedSample], records: &mut Vec<u8>) {
     for sample in samples {
-        let batch = Batch::of(std::slice::from_ref(sample));
+        let batch = TrainingBatch::of(std::slice::from_ref(sample));
         let grid = Input {
             positions: &batch.positions,
             known: &batch.known,
@@ -45,17 +42,20 @@ mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    use super::super::batch::Recipe;
-    use super::super::burned::input_fill;
+    use super::super::batch::BatchGenerator;
+    use super::super::burn_trainer::input_fill;
     use super::*;
-    use crate::scarffolds::samples::Sample;
+    use crate::scarffolds::samples::TrainingSample;
     use darn_geometry::grid::cell_centre;
     use darn_net::UnetConfig;
 
+    /// Length of one record, bytes.
+    const RECORD: usize = 2 * 3 * CELLS * 4 + 3 * 4 + CELLS;
+
     /// Two bent sheets with the same hole.
-    fn bent(_: &mut ChaCha8Rng) -> Vec<Sample> {
+    fn bent(_: &mut ChaCha8Rng) -> Vec<TrainingSample> {
         let hole: Vec<bool> = (0..CELLS).map(|k| (1000..1040).contains(&k)).collect();
-        let sheet = |bend: f32| Sample {
+        let sheet = |bend: f32| TrainingSample {
             truth: (0..CELLS)
                 .map(|k| cell_centre(k).map(|x| x as f32))
                 .map(|p| [p.x, p.y, bend * (7.0 * p.x).sin()])
@@ -68,15 +68,15 @@ mod tests {
     }
 
     #[test]
-    fn records_hold_what_the_network_sees() {
-        let recipe = Recipe {
+    fn records_hold_the_input_of_the_network() {
+        let generator = BatchGenerator {
             source: Arc::new(bent),
             network: UnetConfig::default(),
             size: 40,
             seed: 5,
         };
-        let samples = recipe.samples(&mut ChaCha8Rng::seed_from_u64(5));
-        // Anchors lie beside the plate: there the membrane has something to do.
+        let samples = generator.samples(&mut ChaCha8Rng::seed_from_u64(5));
+        // Anchors are not on the plate, so the membrane is not zero there.
         let anchored = samples
             .iter()
             .filter(|s| s.hole.iter().filter(|h| **h).count() < 40);
