@@ -40,7 +40,7 @@ struct Args {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let args = Args::parse();
-    let standard = Network::load(&std::fs::read(&args.weights)?, Options::default())?;
+    let standard = Network::load(&std::fs::read(&args.weights)?, EngineOptions::default())?;
     let mender = Arc::new(NetworkMender {
         limits: MendLimits {
             response: match args.response.as_str() {

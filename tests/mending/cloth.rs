@@ -30,7 +30,7 @@ pub const ROUND: Hole = Hole::Circle {
 
 /// A network that ships.
 pub fn network(weights: &[u8]) -> Network {
-    Network::load(weights, Options::default()).expect("the shipped weights load")
+    Network::load(weights, EngineOptions::default()).expect("the shipped weights load")
 }
 
 /// The mender, loaded once for all tests.

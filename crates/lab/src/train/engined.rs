@@ -102,7 +102,7 @@ impl Engined {
 impl Student for Engined {
     fn of(snapshot: Snapshot, options: &TrainOptions) -> Result<Self, TrainError> {
         if snapshot.step == 0 && options.from.is_none() {
-            return Err(TrainError::EngineOptions(
+            return Err(TrainError::Options(
                 "the engine keeps the statistics of batch norm: it needs weights to start from"
                     .into(),
             ));
