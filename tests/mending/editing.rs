@@ -214,7 +214,7 @@ fn a_hard_anchor_is_met_or_refused_with_the_numbers() {
         .call(Cancellation::NEVER)
         .positions(&anchored(vec![soft, far])))
     .unwrap_err();
-    assert_eq!(error.code(), "anchor_out_of_reach");
+    assert_eq!(error.code().word, "anchor_out_of_reach");
     assert_eq!(error.fields()[0].pointer, "/anchors/1");
     assert!(error.fields()[0].detail.contains("beyond"), "{error}");
 

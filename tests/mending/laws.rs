@@ -205,5 +205,5 @@ fn a_scan_that_is_mended_has_nothing_left_to_mend() {
     )
     .unwrap();
     let second = mended(&first.bytes, &Constraints::default()).unwrap_err();
-    assert_eq!(second.code(), "no_holes");
+    assert_eq!(second.code().word, "no_holes");
 }

@@ -57,7 +57,7 @@ fn all_holes_are_filled_by_default_and_one_by_id_or_place() {
 fn a_hole_that_is_not_there_is_named() {
     let bytes = packed(&holed(sheet(0), &ROUND).mesh, &[]);
     let error = mended(&bytes, &asking(&[HoleSelector::Id(7)])).unwrap_err();
-    assert_eq!(error.code(), "constraints_do_not_fit");
+    assert_eq!(error.code().word, "constraints_do_not_fit");
     assert_eq!(error.fields()[0].pointer, "/holes/0");
     assert!(
         error.fields()[0].detail.contains("there is no loop 7"),
@@ -97,7 +97,7 @@ fn a_scan_without_holes_is_refused_and_its_loops_are_named() {
     };
     let bytes = packed(&holed(sheet(0), &none).mesh, &[]);
     let error = mended(&bytes, &Constraints::default()).unwrap_err();
-    assert_eq!(error.code(), "no_holes");
+    assert_eq!(error.code().word, "no_holes");
     assert!(
         error
             .to_string()
@@ -233,7 +233,7 @@ fn more_holes_than_are_filled_at_once_are_refused() {
     };
     let scan = read(&pair());
     let error = mend(&scan, &Constraints::default(), &mender).unwrap_err();
-    assert_eq!(error.code(), "too_many_holes");
+    assert_eq!(error.code().word, "too_many_holes");
     assert!(error.to_string().contains("2 holes"), "{error}");
 }
 

@@ -1,4 +1,4 @@
-//! What goes right: both doors give the same answers.
+//! Successful answers over HTTP and gRPC, and the errors of gRPC.
 
 use darn_contract::v1::{
     Anchor, Constraints, ScanChunk, darn_client::DarnClient, inpaint_chunk::Part as ChunkPart,
@@ -7,44 +7,50 @@ use reqwest::multipart::{Form, Part};
 use serde_json::Value;
 use tonic::{Code, codegen::tokio_stream};
 
+use crate::fake::{Behaviour, FakeScan};
 use crate::harness::Service;
 
+/// A scan in two chunks, the first with the constraints.
 fn chunks(
-    scan: &'static str,
+    scan: impl Into<FakeScan>,
     constraints: Option<Constraints>,
 ) -> tokio_stream::Iter<std::vec::IntoIter<ScanChunk>> {
-    let (head, tail) = scan.as_bytes().split_at(scan.len() / 2);
+    let scan = scan.into().bytes();
+    let (head, tail) = scan.split_at(scan.len() / 2);
     tokio_stream::iter(vec![
         ScanChunk {
             constraints,
             query: None,
-            data: head.into(),
+            data: head.to_vec().into(),
         },
         ScanChunk {
             constraints: None,
             query: None,
-            data: tail.into(),
+            data: tail.to_vec().into(),
         },
     ])
 }
 
 #[tokio::test]
-async fn a_scan_comes_back_mended() {
+async fn a_scan_is_mended() {
     let service = Service::start(&[]).await;
     let response = service.scan("cloth").send().await.unwrap();
     assert_eq!(response.status(), 200);
     assert_eq!(response.headers()["content-type"], "model/gltf-binary");
     assert_eq!(response.headers()["darn-holes-filled"], "1");
-    assert_eq!(response.bytes().await.unwrap(), "glTF cloth");
+    assert_eq!(
+        response.bytes().await.unwrap(),
+        FakeScan::named("cloth").mended()
+    );
     assert_eq!(service.metric("darn_holes_filled_total").await, Some(1.0));
 }
 
 #[tokio::test]
-async fn scan_and_report_come_as_parts_when_asked() {
+async fn multipart_mixed_has_the_report_and_the_scan() {
     let service = Service::start(&[]).await;
     let constraints = r#"{"anchors": [{"hole": 2, "uv": [0.5, 0.5], "position": [0, 0, 0]}]}"#;
     let form = Form::new()
-        .part("scan", Part::bytes(b"cloth".as_slice()))
+        .part("scan", Part::bytes(FakeScan::named("cloth").bytes()))
         .part(
             "constraints",
             Part::text(constraints)
@@ -70,7 +76,8 @@ async fn scan_and_report_come_as_parts_when_asked() {
     let report: Value =
         serde_json::from_str(report.split_once("\r\n\r\n").unwrap().1.trim()).unwrap();
     assert_eq!(report["notes"][0], "1 anchors");
-    assert!(scan.ends_with("\r\n\r\nglTF cloth\r\n"));
+    let mended = String::from_utf8(FakeScan::named("cloth").mended()).unwrap();
+    assert!(scan.ends_with(&format!("\r\n\r\n{mended}\r\n")));
 }
 
 #[tokio::test]
@@ -121,11 +128,11 @@ async fn grpc_shares_the_port() {
         };
         scan.extend_from_slice(&data);
     }
-    assert_eq!(scan, b"glTF cloth");
+    assert_eq!(scan, FakeScan::named("cloth").mended());
 }
 
 #[tokio::test]
-async fn grpc_has_the_same_errors() {
+async fn grpc_has_the_codes_of_http() {
     let service = Service::start(&["--body-limit", "1KiB"]).await;
     let mut client = DarnClient::connect(service.url("")).await.unwrap();
     let wrong = Constraints {
@@ -151,17 +158,21 @@ async fn grpc_has_the_same_errors() {
     };
     let cases = [
         (
-            client.inpaint(chunks("cone", None)).await,
+            client
+                .inpaint(chunks(Behaviour::RefuseNotADisk, None))
+                .await,
             Code::FailedPrecondition,
             "not_a_disk",
         ),
         (
-            client.inpaint(chunks("truncated", None)).await,
+            client
+                .inpaint(chunks(Behaviour::RefuseTruncated, None))
+                .await,
             Code::InvalidArgument,
             "truncated",
         ),
         (
-            client.inpaint(chunks("panic", None)).await,
+            client.inpaint(chunks(Behaviour::Panic, None)).await,
             Code::Internal,
             "internal",
         ),
@@ -181,7 +192,9 @@ async fn grpc_has_the_same_errors() {
             "message_too_large",
         ),
         (
-            client.inpaint(chunks("", None)).await,
+            client
+                .inpaint(tokio_stream::iter([ScanChunk::default()]))
+                .await,
             Code::InvalidArgument,
             "empty_body",
         ),
@@ -203,18 +216,18 @@ async fn grpc_has_the_same_errors() {
             .unwrap();
         let parsed: Value = serde_json::from_slice(&document).unwrap();
         assert_eq!(parsed["code"], word);
-        // With what base64 adds, well within the 8 KiB of headers that some clients take.
+        // Even after base64 well within the 8 KiB of headers that every client accepts.
         assert!(document.len() <= 3 << 10, "{}", document.len());
         assert!(status.message().len() <= 600);
     }
 }
 
 #[tokio::test]
-async fn a_health_check_asks_for_readiness() {
+async fn a_health_check_tells_whether_the_service_is_ready() {
     let service = Service::start(&[]).await;
     let ask = |address| {
-        let patience = std::time::Duration::from_secs(5);
-        tokio::task::spawn_blocking(move || darn_serve::healthcheck(address, patience))
+        let timeout = std::time::Duration::from_secs(5);
+        tokio::task::spawn_blocking(move || darn_serve::healthcheck(address, timeout))
     };
     ask(service.address).await.unwrap().unwrap();
     service.stop.cancel();

@@ -2,7 +2,8 @@
 
 use serde_json::{Map, Value, json};
 
-use super::{body, cloth, found, reference, refused, responses};
+use super::{body, found, mended, reference, refused, responses};
+use crate::media_types::{GLB, GLTF, JSON, OCTET_STREAM};
 
 /// `POST /sessions`.
 pub(super) fn open() -> Value {
@@ -18,7 +19,8 @@ pub(super) fn open() -> Value {
         "requestBody": body(&[("constraints", "Constraints")], &[]),
         "responses": with(
             responses(
-                ("201", opened),
+                "201",
+                opened,
                 "A scan that cannot be mended, or constraints: they choose holes and weights here, anchors and edits come later",
             ),
             &[("413", "Larger than a limit of the service; the limit is named. With code `session_too_large`: kept, it would be")],
@@ -36,7 +38,7 @@ pub(super) fn describe() -> Value {
         "summary": "Describe a session",
         "operationId": "describeSession",
         "parameters": [id()],
-        "responses": with(with(Value::Object(responses), &WORKING), &GONE),
+        "responses": with(with(Value::Object(responses), &JOB_ERRORS), &SESSION_ERRORS),
     })
 }
 
@@ -48,29 +50,30 @@ pub(super) fn delete() -> Value {
         "summary": "End a session",
         "operationId": "deleteSession",
         "parameters": [id()],
-        "responses": with(with(responses, &GONE[..2]), &[("503", "The service shuts down")]),
+        "responses": with(with(responses, &SESSION_ERRORS[..2]), &[("503", "The service shuts down")]),
     })
 }
 
 /// `POST /sessions/{id}/inpaint`.
 pub(super) fn inpaint() -> Value {
-    let patches = cloth(
+    let patches = mended(
         "The patches alone: as a GLB, or as positions on the session's topology: patch after patch, in order of hole id, x, y, z of \
             every vertex as little-endian 32-bit floats, in the order of `patchUvs`",
         "patches",
-        &["model/gltf-binary", "application/octet-stream"],
+        &[GLB, OCTET_STREAM],
     );
     json!({
         "summary": "Fill the holes of a session",
         "operationId": "inpaintSession",
         "parameters": [id()],
-        "requestBody": asked("Constraints", "Anchors and edits; left out, the cloth as it is without any", false),
+        "requestBody": json_body("Constraints", "Anchors and edits; left out, the cloth as it is without any"),
         "responses": with(
             responses(
-                ("200", patches),
+                "200",
+                patches,
                 "Constraints that cannot be met, or that choose holes or weights; `errors` names them",
             ),
-            &GONE,
+            &SESSION_ERRORS,
         ),
     })
 }
@@ -81,32 +84,32 @@ pub(super) fn optimize_anchor() -> Value {
         "summary": "Find where on the grid of a session's hole a point in space belongs",
         "operationId": "optimizeSessionAnchor",
         "parameters": [id()],
-        "requestBody": asked("AnchorQuery", "What to search", true),
+        "requestBody": required(json_body("AnchorQuery", "What to search")),
         "responses": with(
-            responses(("200", found()), "A query that cannot be searched; `errors` names its fields"),
-            &GONE,
+            responses("200", found(), "A query that cannot be searched; `errors` names its fields"),
+            &SESSION_ERRORS,
         ),
     })
 }
 
 /// `GET /sessions/{id}/result`.
 pub(super) fn result() -> Value {
-    let mended = cloth(
+    let mended = mended(
         "The whole scan, mended with the constraints that the session met last, in the container of the input",
         "scan",
-        &["model/gltf-binary", "model/gltf+json"],
+        &[GLB, GLTF],
     );
     let responses = Map::from_iter([("200".to_owned(), mended)]);
     json!({
         "summary": "The whole scan of a session, mended",
         "operationId": "sessionResult",
         "parameters": [id()],
-        "responses": with(with(Value::Object(responses), &WORKING), &GONE),
+        "responses": with(with(Value::Object(responses), &JOB_ERRORS), &SESSION_ERRORS),
     })
 }
 
-/// Refusals of a route that names a session.
-const GONE: [(&str, &str); 3] = [
+/// Errors of a route that names a session.
+const SESSION_ERRORS: [(&str, &str); 3] = [
     ("404", "There is no session of this id"),
     (
         "410",
@@ -115,8 +118,8 @@ const GONE: [(&str, &str); 3] = [
     ("429", "Too many requests for this session are under way"),
 ];
 
-/// Refusals of a route without a body that works.
-const WORKING: [(&str, &str); 4] = [
+/// Errors of a route that runs a job and takes no body.
+const JOB_ERRORS: [(&str, &str); 4] = [
     ("422", "Cloth that cannot be mended as it was asked"),
     (
         "500",
@@ -129,8 +132,9 @@ const WORKING: [(&str, &str); 4] = [
     ("504", "Waiting and mending took longer than the deadline"),
 ];
 
-fn with(mut responses: Value, refusals: &[(&str, &str)]) -> Value {
-    for (status, description) in refusals {
+/// Adds errors to the answers of a route.
+fn with(mut responses: Value, errors: &[(&str, &str)]) -> Value {
+    for (status, description) in errors {
         responses[*status] = refused(description);
     }
     responses
@@ -139,17 +143,23 @@ fn with(mut responses: Value, refusals: &[(&str, &str)]) -> Value {
 fn described(description: &str) -> Value {
     json!({
         "description": description,
-        "content": { "application/json": { "schema": reference("Session") } },
+        "content": { JSON: { "schema": reference("Session") } },
     })
 }
 
-fn asked(schema: &str, description: &str, required: bool) -> Value {
+/// A request body of JSON that may be left out.
+fn json_body(schema: &str, description: &str) -> Value {
     let schema = json!({ "schema": reference(schema) });
     json!({
         "description": description,
-        "required": required,
-        "content": { "application/json": schema, "application/octet-stream": schema },
+        "required": false,
+        "content": { JSON: schema, OCTET_STREAM: schema },
     })
+}
+
+fn required(mut body: Value) -> Value {
+    body["required"] = true.into();
+    body
 }
 
 fn id() -> Value {
