@@ -63,7 +63,9 @@ pub fn plan_in(
     options: &PatchOptions,
 ) -> Result<PatchPlan, PatchError> {
     let rim = reversed_rim(region);
-    let scanned: Vec<u32> = (rim.iter()).map(|v| region.vertices[*v as usize].0).collect();
+    let scanned: Vec<u32> = (rim.iter())
+        .map(|v| region.vertices[*v as usize].0)
+        .collect();
     let rim_points = RimPoints::new(&positions_of(&scanned, scan), scan);
     plan_rim(rim, rim_points, region, chart, options)
 }
