@@ -9,4 +9,5 @@ pub mod flatten;
 pub mod grid;
 pub mod mesh;
 pub mod patch;
+pub mod polygon;
 pub mod smooth;

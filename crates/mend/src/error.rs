@@ -1,4 +1,4 @@
-//! Why a scan could not be mended, and the stable word programs know each reason by.
+//! Why a scan could not be mended, and the code of each reason: a stable word for programs.
 
 use darn_contract::{FieldError, v1};
 use darn_geometry::flatten::FlattenError;
@@ -10,24 +10,27 @@ use darn_net::NetError;
 /// Why a scan could not be mended.
 #[derive(Debug, thiserror::Error)]
 pub enum MendError {
+    /// The bytes could not be read as a scan.
+    #[error(transparent)]
+    Unreadable(ScanError),
     /// Constraints that do not fit this scan.
-    #[error("{} constraint(s) do not fit this scan: {}", .0.len(), told(.0))]
+    #[error("{} constraint(s) do not fit this scan: {}", .0.len(), listed(.0))]
     Constraints(Vec<FieldError>),
     /// Hard anchors that the cloth does not meet.
-    #[error("{} anchor(s) cannot be met: {}", .0.len(), told(.0))]
+    #[error("{} anchor(s) cannot be met: {}", .0.len(), listed(.0))]
     OutOfReach(Vec<FieldError>),
-    /// Nothing to fill.
-    #[error("the scan has no hole to fill{}", left(.skipped))]
+    /// The scan has no hole to fill.
+    #[error("the scan has no hole to fill{}", reasons(.skipped))]
     NoHoles {
-        /// Its loops and why they are left as they are.
+        /// Its loops, and why each is left as it is.
         skipped: Vec<v1::Skipped>,
     },
-    /// More holes than are filled at once.
+    /// The request asks for more holes than are filled at once.
     #[error(
         "{found} holes are to be filled, and at most {limit} are at once; choose among them by `holes`"
     )]
     TooManyHoles {
-        /// Holes to fill.
+        /// How many holes the request asks for.
         found: usize,
         /// How many are filled at once.
         limit: usize,
@@ -38,7 +41,7 @@ pub enum MendError {
         /// Id of the hole's loop.
         hole: u32,
     },
-    /// No disk of cloth around the hole.
+    /// The cloth around the hole is no disk.
     #[error("hole {hole}: {source}")]
     Region {
         /// Id of the hole's loop.
@@ -46,7 +49,7 @@ pub enum MendError {
         /// Why.
         source: RegionError,
     },
-    /// The cloth around the hole does not lie flat.
+    /// The cloth around the hole cannot be laid flat.
     #[error("hole {hole}: {source}")]
     Flatten {
         /// Id of the hole's loop.
@@ -64,7 +67,7 @@ pub enum MendError {
         /// Cells the cloth covers.
         known: usize,
     },
-    /// The hole is so small that no cell of the grid lies in it.
+    /// No cell of the grid lies in the hole.
     #[error(
         "hole {hole} is so narrow that no cell of the grid lies in it; there is no place to search"
     )]
@@ -95,9 +98,22 @@ pub enum MendError {
 }
 
 impl MendError {
-    /// The stable word for programs.
+    /// The code of the error: a stable word for programs. This is the only place that gives errors their codes; which class and status a code
+    /// has stands in the contract.
     pub fn code(&self) -> &'static str {
         match self {
+            MendError::Unreadable(error) => match error {
+                ScanError::Container { .. } => "not_a_gltf",
+                ScanError::Invalid { .. } => "invalid_gltf",
+                ScanError::IndexOutOfRange { .. } => "index_out_of_range",
+                ScanError::NotFinite { .. } => "position_not_finite",
+                ScanError::Unsupported { .. } => "unsupported_extension",
+                ScanError::External { .. } => "external_data",
+                ScanError::Limit { .. } => "scan_too_large",
+                ScanError::NoTriangles => "no_triangles",
+                ScanError::Singular { .. } => "singular_transform",
+                ScanError::Addition { .. } => "internal",
+            },
             MendError::Constraints(_) => "constraints_do_not_fit",
             MendError::OutOfReach(_) => "anchor_out_of_reach",
             MendError::NoHoles { .. } => "no_holes",
@@ -124,12 +140,12 @@ impl MendError {
         }
     }
 
-    /// Whether it is our own fault and no business of the caller's.
+    /// Whether the fault is darn's own; its text is not shown to callers.
     pub fn is_internal(&self) -> bool {
         self.code() == "internal"
     }
 
-    /// The constraints it is about.
+    /// The fields of the constraints that the error is about.
     pub fn fields(&self) -> Vec<FieldError> {
         match self {
             MendError::Constraints(fields) | MendError::OutOfReach(fields) => fields.clone(),
@@ -138,15 +154,12 @@ impl MendError {
     }
 }
 
-fn told(fields: &[FieldError]) -> String {
-    let each: Vec<String> = fields
-        .iter()
-        .map(|f| format!("{}: {}", f.pointer, f.detail))
-        .collect();
+fn listed(fields: &[FieldError]) -> String {
+    let each: Vec<String> = fields.iter().map(FieldError::to_string).collect();
     each.join("; ")
 }
 
-fn left(skipped: &[v1::Skipped]) -> String {
+fn reasons(skipped: &[v1::Skipped]) -> String {
     match skipped {
         [] => ": its surface is closed, without any boundary loop".to_owned(),
         loops => {

@@ -1,4 +1,4 @@
-//! The port's [`Mender`] on loaded networks: reads the scan, mends it, and sorts refusals by whose fault they are.
+//! The port's [`Mender`] on loaded networks: reads the scan, mends it, and turns errors into refusals.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -10,20 +10,24 @@ use darn_contract::port::{
 use darn_contract::{Constraints, Search, v1};
 use darn_gltf_scan::{Scan, ScanError};
 
-use super::{Call, MendError, NetworkMender, ScanSession, add_read_time};
+use crate::error::MendError;
+use crate::mender::{Call, NetworkMender};
+use crate::session::ScanSession;
+use crate::timings::add_read_time;
 
-/// The scan of the warm-up mend: small, and whole and real.
+/// The scan that the warm-up mends: a real one, small.
 const EXAMPLE: &[u8] = include_bytes!("../../../examples/scarf_hole.glb");
 
-/// A mender that sessions share, behind the port.
+/// A mender behind the port; sessions share it.
 #[derive(Debug, Clone)]
 pub struct SharedMender(pub Arc<NetworkMender>);
 
 impl SharedMender {
-    /// A scan, and how long reading it took.
+    /// Reads a scan; also returns how long that took.
     fn scan(&self, bytes: &[u8]) -> Result<(Scan, Duration), Refusal> {
         let started = Instant::now();
-        let scan = Scan::read(bytes, &self.0.scan_limits).map_err(|error| of_scan(&error))?;
+        let scan = Scan::read(bytes, &self.0.scan_limits)
+            .map_err(|error| refusal(MendError::Unreadable(error)))?;
         Ok((scan, started.elapsed()))
     }
 
@@ -44,7 +48,7 @@ impl Mender for SharedMender {
     ) -> Result<Mended, Refusal> {
         let (scan, read) = self.scan(scan)?;
         let mut mended =
-            super::mend(&scan, constraints, self.call(cancellation)).map_err(of_mend)?;
+            crate::mend(&scan, constraints, self.call(cancellation)).map_err(refusal)?;
         add_read_time(&mut mended.report.timings, read);
         Ok(mended)
     }
@@ -56,7 +60,7 @@ impl Mender for SharedMender {
         cancellation: Cancellation<'_>,
     ) -> Result<v1::AnchorFound, Refusal> {
         let (scan, _) = self.scan(scan)?;
-        super::optimize_anchor(&scan, search, self.call(cancellation)).map_err(of_mend)
+        crate::optimize_anchor(&scan, search, self.call(cancellation)).map_err(refusal)
     }
 
     fn mend_to_target(
@@ -67,7 +71,7 @@ impl Mender for SharedMender {
     ) -> Result<Mended, Refusal> {
         let (scan, read) = self.scan(scan)?;
         let mut mended =
-            super::mend_to_target(&scan, search, self.call(cancellation)).map_err(of_mend)?;
+            crate::mend_to_target(&scan, search, self.call(cancellation)).map_err(refusal)?;
         add_read_time(&mut mended.report.timings, read);
         Ok(mended)
     }
@@ -80,12 +84,12 @@ impl Mender for SharedMender {
     ) -> Result<Box<dyn EditSession>, Refusal> {
         let (scan, _) = self.scan(scan)?;
         let session = ScanSession::open(scan, constraints, Arc::clone(&self.0), cancellation);
-        Ok(Box::new(session.map_err(of_mend)?))
+        Ok(Box::new(session.map_err(refusal)?))
     }
 
     fn find_holes(&self, scan: &[u8]) -> Result<v1::HolesReport, Refusal> {
         let (scan, read) = self.scan(scan)?;
-        let mut found = super::find_holes(&scan);
+        let mut found = crate::find_holes(&scan);
         add_read_time(&mut found.timings, read);
         Ok(found)
     }
@@ -113,9 +117,9 @@ impl EditSession for ScanSession {
     ) -> Result<Patches, Refusal> {
         let call = self.call(cancellation);
         let (bytes, report) = match form {
-            PatchForm::Glb => call.glb(constraints).map_err(of_mend)?,
+            PatchForm::Glb => call.glb(constraints).map_err(refusal)?,
             PatchForm::Positions => {
-                let (positions, report) = call.positions(constraints).map_err(of_mend)?;
+                let (positions, report) = call.positions(constraints).map_err(refusal)?;
                 let numbers = positions.iter().flatten().flat_map(|p| [p.x, p.y, p.z]);
                 let bytes = numbers.flat_map(|x| (x as f32).to_le_bytes());
                 (bytes.collect(), report)
@@ -129,7 +133,7 @@ impl EditSession for ScanSession {
         constraints: &Constraints,
         cancellation: Cancellation<'_>,
     ) -> Result<Mended, Refusal> {
-        self.call(cancellation).mended(constraints).map_err(of_mend)
+        self.call(cancellation).mended(constraints).map_err(refusal)
     }
 
     fn optimize_anchor(
@@ -138,37 +142,19 @@ impl EditSession for ScanSession {
         cancellation: Cancellation<'_>,
     ) -> Result<v1::AnchorFound, Refusal> {
         let found = self.call(cancellation).optimize_anchor(search);
-        found.map_err(of_mend)
+        found.map_err(refusal)
     }
 }
 
-/// The bytes decide between "not a scan" and "a scan that cannot be mended".
-fn of_scan(error: &ScanError) -> Refusal {
-    let (class, code) = match error {
-        ScanError::Container { .. } => (Class::Malformed, "not_a_gltf"),
-        ScanError::Invalid { .. } => (Class::Malformed, "invalid_gltf"),
-        ScanError::IndexOutOfRange { .. } => (Class::Unprocessable, "index_out_of_range"),
-        ScanError::NotFinite { .. } => (Class::Unprocessable, "position_not_finite"),
-        ScanError::Unsupported { .. } => (Class::Unprocessable, "unsupported_extension"),
-        ScanError::External { .. } => (Class::Unprocessable, "external_data"),
-        ScanError::Limit { .. } => (Class::TooLarge, "scan_too_large"),
-        ScanError::NoTriangles => (Class::Unprocessable, "no_triangles"),
-        ScanError::Singular { .. } => (Class::Unprocessable, "singular_transform"),
-        ScanError::Addition { .. } => (Class::Internal, "internal"),
-    };
-    Refusal {
-        class,
-        code,
-        detail: error.to_string(),
-        fields: Vec::new(),
-    }
-}
-
-fn of_mend(error: MendError) -> Refusal {
-    let class = if error.is_internal() {
-        Class::Internal
-    } else {
-        Class::Unprocessable
+/// A refusal's code and fields are the error's; its class says whether the bytes, the scan or darn is at fault.
+fn refusal(error: MendError) -> Refusal {
+    let class = match &error {
+        MendError::Unreadable(ScanError::Container { .. } | ScanError::Invalid { .. }) => {
+            Class::Malformed
+        }
+        MendError::Unreadable(ScanError::Limit { .. }) => Class::TooLarge,
+        error if error.is_internal() => Class::Internal,
+        _ => Class::Unprocessable,
     };
     Refusal {
         class,
@@ -190,4 +176,45 @@ fn told(error: &dyn Error) -> String {
         next = cause.source();
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use darn_geometry::mesh::region::RegionError;
+
+    #[test]
+    fn a_cause_that_the_error_names_already_is_told_once() {
+        let error = MendError::Region {
+            hole: 3,
+            source: RegionError::TooLarge {
+                rim: 3,
+                coordinate: 1e120,
+                limit: 1e100,
+            },
+        };
+        let text = error.to_string();
+        let refusal = refusal(error);
+        assert_eq!(refusal.class, Class::Unprocessable);
+        assert_eq!(refusal.code, "coordinates_too_large");
+        assert_eq!(refusal.detail, text);
+    }
+
+    #[test]
+    fn unreadable_bytes_and_a_scan_that_is_too_large_have_classes_of_their_own() {
+        let class = |error| refusal(MendError::Unreadable(error)).class;
+        let cut_off = ScanError::Container {
+            offset: 12,
+            detail: "the file ends".into(),
+        };
+        let too_large = ScanError::Limit {
+            pointer: "/nodes".into(),
+            limit: "nodes",
+            allowed: 1,
+            found: 2,
+        };
+        assert_eq!(class(cut_off), Class::Malformed);
+        assert_eq!(class(too_large), Class::TooLarge);
+        assert_eq!(class(ScanError::NoTriangles), Class::Unprocessable);
+    }
 }

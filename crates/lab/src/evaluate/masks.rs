@@ -7,7 +7,6 @@ use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 use super::cases::{Case, extent};
-use super::patched::inside;
 use crate::scarffolds::scanned::{Hole, scanned};
 use crate::scarffolds::sheets::Sheet;
 use darn_geometry::flatten::{self, Chart, FlattenLimits};
@@ -16,6 +15,7 @@ use darn_geometry::mesh::loops::{LoopKind, boundary_loops};
 use darn_geometry::mesh::region::{Region, grow};
 use darn_geometry::mesh::topology::Topology;
 use darn_geometry::mesh::{TriMesh, Vec2};
+use darn_geometry::polygon::inside;
 
 /// How much of the grid's side the service lets a hole take, and when it tries again; as in `mend`.
 const SHARE: f64 = 0.5;
