@@ -1,7 +1,7 @@
-//! The measurements of interactive editing on held-out sheets: anchors met, anchors that change nothing, absurd anchors, and the anchor
-//! search against trying every cell. `cargo run --release --example editing_table -- SHEETS [--weights FILE] [--count N]`
+//! Measures interactive editing on held-out sheets: how near the cloth comes to anchors, how much anchors on the cloth change it, what
+//! anchors far away do, and how the anchor search compares with trying every cell. `cargo run --release --example editing_table -- SHEETS [--weights FILE] [--count N]`
 //!
-//! SHEETS is a folder that `darn scarffolds` wrote, with seeds that the network was not trained on.
+//! SHEETS is a folder that `darn scarffolds` wrote with seeds that the network was not trained on.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use darn_gltf_scan::export::{NewMesh, glb};
 use darn_lab::scarffolds::holed_scan::{HoleShape, holed_scan};
 use darn_lab::scarffolds::sheets;
 use darn_lab::scarffolds::sheets::SimulatedSheet;
-use darn_mend::{MendLimits, NetworkMender, Response, ScanSession};
+use darn_mend::{EditedFill, MendLimits, NetworkMender, ScanSession};
 use darn_net::engine::EngineOptions;
 use darn_net::{Network, Networks};
 use rand::{Rng, SeedableRng};
@@ -43,9 +43,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let standard = Network::load(&std::fs::read(&args.weights)?, EngineOptions::default())?;
     let mender = Arc::new(NetworkMender {
         limits: MendLimits {
-            response: match args.response.as_str() {
-                "plain" => Response::Plain,
-                _ => Response::Difference,
+            edited_fill: match args.response.as_str() {
+                "plain" => EditedFill::Plain,
+                _ => EditedFill::Difference,
             },
             ..MendLimits::default()
         },
@@ -96,17 +96,17 @@ struct Case {
     open_ms: f64,
 }
 
-/// What was measured.
+/// The measurements of a case.
 struct Row {
     /// Cells the cloth moves (RMS) for anchors where it is.
     still: f64,
-    /// Cells that stay to an anchor two cells off along a random direction; how much of it is beyond reach; stretch.
+    /// For an anchor two cells away in a random direction: cells between it and the cloth, cells of these beyond reach, stretch.
     off: [f64; 3],
-    /// The same across the cloth.
+    /// The same for an anchor two cells away across the cloth.
     across: [f64; 3],
-    /// Stretch without and with an anchor ten hole widths away; the largest move, in hole widths.
+    /// Stretch without and with an anchor ten hole widths away, and the largest move in hole widths.
     absurd: [f64; 3],
-    /// Losses of the search and of trying all; cells between them; evaluations, gradients, milliseconds of both.
+    /// Losses of the search and of trying all, cells between the two results; evaluations, gradients and milliseconds of each.
     search: [f64; 9],
     /// Milliseconds of opening, and of moving one anchor.
     ms: [f64; 2],
@@ -292,7 +292,7 @@ impl Case {
         ])
     }
 
-    /// The rim's mean normal, to the side that the cloth at a vertex bulges away from.
+    /// The rim's mean normal, on the side away from which the cloth bulges at a vertex.
     fn normal(&self, vertex: usize) -> Vec3 {
         let rim = &self.positions[..self.rim];
         let middle = rim.iter().sum::<Vec3>() / rim.len() as f64;

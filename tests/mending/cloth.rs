@@ -1,4 +1,4 @@
-//! Scans with holes, and what to know about a mended one.
+//! Scans with holes for the tests, and a mended scan taken apart.
 
 use std::sync::{Arc, OnceLock};
 
@@ -19,7 +19,7 @@ use darn_net::{Network, Networks};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// The weights that ship.
+/// The standard weights that ship with darn.
 pub const WEIGHTS: &[u8] = include_bytes!("../../weights/standard.safetensors");
 
 /// A hole in the middle, a quarter of the sheet wide.
@@ -28,7 +28,7 @@ pub const ROUND: HoleShape = HoleShape::Circle {
     radius: 0.13,
 };
 
-/// A network that ships.
+/// A network on weights that ship with darn.
 pub fn network(weights: &[u8]) -> Network {
     Network::load(weights, EngineOptions::default()).expect("the shipped weights load")
 }
@@ -51,7 +51,7 @@ pub fn sheet(index: usize) -> &'static SimulatedSheet {
     &SHEETS.get_or_init(|| make().collect())[index]
 }
 
-/// A sheet that `place` lays over (u, v) in the unit square.
+/// A sheet whose point (u, v) of the unit square lies at `place(u, v)`.
 pub fn laid(place: impl Fn(f32, f32) -> [f32; 3]) -> SimulatedSheet {
     let at = |k: usize| place((k % 51) as f32 / 50.0, (k / 51) as f32 / 50.0);
     SimulatedSheet {
@@ -87,8 +87,8 @@ pub fn mended(bytes: &[u8], constraints: &Constraints) -> Result<Mended, MendErr
     mend(&read(bytes), constraints, mender())
 }
 
-/// A mended scan, welded, and which of its faces are reconstructed.
-pub struct Seen {
+/// A mended scan, welded, and the indices of its reconstructed faces.
+pub struct MendedScan {
     pub scan: Scan,
     pub welded: WeldedMesh,
     pub topology: Topology,
@@ -96,8 +96,8 @@ pub struct Seen {
     pub patch: Vec<usize>,
 }
 
-impl Seen {
-    pub fn of(bytes: &[u8]) -> Seen {
+impl MendedScan {
+    pub fn of(bytes: &[u8]) -> MendedScan {
         let scan = read(bytes);
         let welded = weld(&scan.surface);
         let topology = Topology::new(&welded.mesh);
@@ -107,7 +107,7 @@ impl Seen {
             scan.parts[part].reconstructed
         };
         let patch = (0..welded.mesh.faces.len()).filter(new).collect();
-        Seen {
+        MendedScan {
             scan,
             welded,
             topology,
@@ -121,8 +121,8 @@ impl Seen {
         self.patch.iter().map(|f| areas[*f]).sum()
     }
 
-    /// Positions of the patch's vertices that are not on the scan's rim.
-    pub fn invented(&self) -> Vec<Vec3> {
+    /// Positions of the patch's vertices that are not on the rim.
+    pub fn new_positions(&self) -> Vec<Vec3> {
         let mut scans = vec![false; self.welded.mesh.positions.len()];
         let faces = self.welded.mesh.faces.iter().enumerate();
         for (_, face) in faces.filter(|(f, _)| self.patch.binary_search(f).is_err()) {

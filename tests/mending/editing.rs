@@ -1,4 +1,4 @@
-//! What a hand may do to the new cloth: anchors, gestures, the anchor search, sessions.
+//! Anchors, gestures, the anchor search and sessions.
 
 use std::sync::Arc;
 
@@ -10,8 +10,8 @@ use darn_mend::ScanSession;
 
 use super::cloth::{ROUND, holed, laid, mended, mender, packed, read, sheet};
 
-/// A session on a sheet with a round hole, and its cloth as it is without constraints.
-struct Edited {
+/// A session on a sheet with a round hole, and its cloth without constraints.
+struct EditedSheet {
     session: ScanSession,
     positions: Vec<Vec3>,
     uvs: Vec<Vec2>,
@@ -22,8 +22,8 @@ struct Edited {
     extent: f64,
 }
 
-impl Edited {
-    fn of(sheet: &SimulatedSheet) -> Edited {
+impl EditedSheet {
+    fn of(sheet: &SimulatedSheet) -> EditedSheet {
         let scan = read(&packed(&holed(sheet, &ROUND).mesh, &[]));
         let session = ScanSession::open(
             scan,
@@ -45,7 +45,7 @@ impl Edited {
             each().fold(f64::MIN, f64::max) - each().fold(f64::MAX, f64::min)
         };
         let extent = across(0).max(across(1)) * 64.0 * grid.spacing_mean;
-        Edited {
+        EditedSheet {
             positions: positions.remove(0),
             uvs: (hole.patch_uvs.chunks_exact(2))
                 .map(|uv| Vec2::new(uv[0], uv[1]))
@@ -57,7 +57,7 @@ impl Edited {
         }
     }
 
-    /// The inner vertex nearest to a place relative to the hole's middle, in shares of its half width.
+    /// The inner vertex nearest to a place, given relative to the hole's middle in shares of its half width.
     fn vertex(&self, at: [f64; 2]) -> usize {
         let rim = &self.uvs[..self.rim];
         let middle = rim.iter().sum::<Vec2>() / rim.len() as f64;
@@ -83,7 +83,7 @@ impl Edited {
         }
     }
 
-    /// A unit vector across the cloth at a vertex: along the curvature there, where there is slack.
+    /// A unit vector across the cloth at a vertex, to the side where the cloth has slack.
     fn across(&self, vertex: usize) -> Vec3 {
         let rim = &self.positions[..self.rim];
         let middle = rim.iter().sum::<Vec3>() / rim.len() as f64;
@@ -120,9 +120,9 @@ fn rms(a: &[Vec3], b: &[Vec3]) -> f64 {
 }
 
 #[test]
-fn anchors_on_the_unedited_cloth_change_next_to_nothing() {
+fn anchors_on_the_unedited_cloth_change_it_by_less_than_a_tenth_of_a_cell() {
     for k in 0..3 {
-        let cloth = Edited::of(sheet(k));
+        let cloth = EditedSheet::of(sheet(k));
         let places = [[0.0, 0.0], [0.5, 0.2], [-0.3, -0.5]];
         let anchors = places.map(|at| cloth.anchor(cloth.vertex(at), Vec3::zeros()));
         let (positions, report) = cloth
@@ -144,7 +144,7 @@ fn anchors_on_the_unedited_cloth_change_next_to_nothing() {
 #[test]
 fn an_anchor_two_cells_off_is_met() {
     for k in 0..3 {
-        let cloth = Edited::of(sheet(k));
+        let cloth = EditedSheet::of(sheet(k));
         let vertex = cloth.vertex([0.1, -0.1]);
         let by = cloth.across(vertex) * 2.0 * cloth.cell;
         let asked = anchored(vec![cloth.anchor(vertex, by)]);
@@ -166,9 +166,9 @@ fn an_anchor_two_cells_off_is_met() {
 }
 
 #[test]
-fn an_absurd_anchor_neither_tears_nor_explodes() {
+fn an_anchor_ten_holes_away_neither_tears_nor_inflates_the_cloth() {
     for k in 0..3 {
-        let cloth = Edited::of(sheet(k));
+        let cloth = EditedSheet::of(sheet(k));
         let vertex = cloth.vertex([0.0, 0.0]);
         let by = cloth.across(vertex) * 10.0 * cloth.extent;
         let asked = anchored(vec![cloth.anchor(vertex, by)]);
@@ -201,7 +201,7 @@ fn an_absurd_anchor_neither_tears_nor_explodes() {
 
 #[test]
 fn a_hard_anchor_is_met_or_refused_with_the_numbers() {
-    let cloth = Edited::of(sheet(0));
+    let cloth = EditedSheet::of(sheet(0));
     let vertex = cloth.vertex([0.0, 0.0]);
     let hard = |by: Vec3| Anchor {
         hard: true,
@@ -228,8 +228,8 @@ fn a_hard_anchor_is_met_or_refused_with_the_numbers() {
 }
 
 #[test]
-fn a_soft_anchor_at_the_rim_gives_way_to_a_hard_one() {
-    let cloth = Edited::of(sheet(0));
+fn a_soft_anchor_at_the_rim_does_not_keep_a_hard_one_from_being_met() {
+    let cloth = EditedSheet::of(sheet(0));
     let middle = cloth.vertex([0.0, 0.0]);
     let hard = Anchor {
         hard: true,
@@ -238,7 +238,7 @@ fn a_soft_anchor_at_the_rim_gives_way_to_a_hard_one() {
     let faces = cloth.session.described().holes[0].patch_faces.clone();
     let inner = |face: &&[u32]| face.iter().filter(|v| **v as usize >= cloth.rim).count() == 1;
     for face in faces.chunks_exact(3).filter(inner).step_by(5) {
-        // Nearly on the rim, and to be moved by half a cell: more than its one free vertex can do.
+        // Nearly on the rim and half a cell off: more than the triangle's one free vertex can reach.
         let share = |v: u32| if (v as usize) < cloth.rim { 0.44 } else { 0.12 };
         let uv: Vec2 = face
             .iter()
@@ -265,7 +265,7 @@ fn a_soft_anchor_at_the_rim_gives_way_to_a_hard_one() {
 
 #[test]
 fn gestures_compose_in_order() {
-    let cloth = Edited::of(sheet(1));
+    let cloth = EditedSheet::of(sheet(1));
     let vertex = cloth.vertex([0.1, 0.1]);
     let (uv, up) = (cloth.uvs[vertex].into(), cloth.across(vertex) * cloth.cell);
     let grab = |share: f64| Gesture::Grab {
@@ -298,7 +298,7 @@ fn gestures_compose_in_order() {
         .positions(&asked)
         .unwrap();
     let off = rms(&back[0], &cloth.positions) / cloth.cell;
-    assert!(off < 0.25, "there and back again: {off} cells");
+    assert!(off < 0.25, "a twist and its inverse: {off} cells");
     assert!(report.holes[0].edits[0].anchors > 5);
 }
 
@@ -314,8 +314,8 @@ fn a_gesture_beside_the_hole_is_refused() {
 }
 
 #[test]
-fn the_search_finds_what_trying_every_cell_finds() {
-    let cloth = Edited::of(sheet(2));
+fn the_search_finds_the_cell_that_trying_all_finds() {
+    let cloth = EditedSheet::of(sheet(2));
     let vertex = cloth.vertex([0.3, -0.3]);
     let target = cloth.positions[vertex] + cloth.across(vertex) * 0.5 * cloth.cell;
     let search = Search {
@@ -368,8 +368,8 @@ fn the_search_finds_what_trying_every_cell_finds() {
 }
 
 #[test]
-fn a_target_out_of_this_world_is_searched_for_all_the_same() {
-    let cloth = Edited::of(sheet(0));
+fn a_target_of_1e17_is_searched_for() {
+    let cloth = EditedSheet::of(sheet(0));
     let search = Search {
         hole: None,
         target: [1e17, 0.0, 0.0],
@@ -408,7 +408,7 @@ fn a_session_answers_as_single_calls_do() {
         Cancellation::NEVER,
     )
     .unwrap();
-    let cloth = Edited::of(&sheet);
+    let cloth = EditedSheet::of(&sheet);
     let asked = Constraints {
         anchors: vec![cloth.anchor(cloth.vertex([0.2, 0.0]), Vec3::y() * cloth.cell)],
         ..edited(&[Gesture::Pinch {
@@ -430,7 +430,7 @@ fn a_session_answers_as_single_calls_do() {
         assert_eq!(kept.report.holes[0].patch, single.report.holes[0].patch);
     }
 
-    // The patches alone are the same vertices.
+    // The patches alone have the same vertices.
     let (glb, _) = session.call(Cancellation::NEVER).glb(&asked).unwrap();
     let (positions, _) = session.call(Cancellation::NEVER).positions(&asked).unwrap();
     let alone = read(&glb);
@@ -463,8 +463,8 @@ fn a_session_answers_as_single_calls_do() {
 }
 
 #[test]
-fn a_session_says_what_it_keeps() {
-    let cloth = Edited::of(sheet(0));
+fn a_session_describes_its_holes() {
+    let cloth = EditedSheet::of(sheet(0));
     let described = cloth.session.described();
     let hole = &described.holes[0];
     assert_eq!(hole.grid_positions.len(), 3 * 64 * 64);

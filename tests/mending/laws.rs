@@ -1,4 +1,4 @@
-//! What must hold of every mended scan.
+//! Laws that every mended scan obeys.
 
 use darn_contract::Constraints;
 use darn_geometry::mesh::loops::LoopKind;
@@ -8,7 +8,9 @@ use darn_mend::{NetworkMender, mend};
 use darn_net::Networks;
 use nalgebra::Rotation3;
 
-use super::cloth::{ROUND, Seen, WEIGHTS, area, holed, laid, mended, network, packed, read, sheet};
+use super::cloth::{
+    MendedScan, ROUND, WEIGHTS, area, holed, laid, mended, network, packed, read, sheet,
+};
 
 fn holes() -> [HoleShape; 3] {
     let centre = Vec2::new(0.47, 0.52);
@@ -28,12 +30,12 @@ fn holes() -> [HoleShape; 3] {
 }
 
 #[test]
-fn holes_of_every_shape_close_and_nothing_else_does() {
+fn holes_of_every_shape_close_and_the_outer_boundary_stays() {
     for (k, hole) in holes().iter().enumerate() {
         let cut = holed(sheet(k), hole);
-        let before = Seen::of(&packed(&cut.mesh, &[]));
+        let before = MendedScan::of(&packed(&cut.mesh, &[]));
         let mended = mended(&packed(&cut.mesh, &[]), &Constraints::default()).unwrap();
-        let after = Seen::of(&mended.bytes);
+        let after = MendedScan::of(&mended.bytes);
 
         let kinds: Vec<LoopKind> = after.loops.iter().map(|l| l.kind).collect();
         assert_eq!(kinds, [LoopKind::Outer], "sheet {k}");
@@ -56,12 +58,12 @@ fn holes_of_every_shape_close_and_nothing_else_does() {
 #[test]
 fn a_flat_sheet_gets_a_flat_patch_of_the_lost_area() {
     let cut = holed(&laid(|u, v| [u, 0.25, -v]), &ROUND);
-    let after = Seen::of(
+    let after = MendedScan::of(
         &mended(&packed(&cut.mesh, &[]), &Constraints::default())
             .unwrap()
             .bytes,
     );
-    for p in after.invented() {
+    for p in after.new_positions() {
         assert!((p.y - 0.25).abs() < 2e-3, "{p:?}");
     }
     let share = after.patch_area() / area(&cut.lost);
@@ -69,19 +71,19 @@ fn a_flat_sheet_gets_a_flat_patch_of_the_lost_area() {
 }
 
 #[test]
-fn a_cylinder_goes_on_through_its_hole() {
+fn the_patch_of_a_cylinder_lies_on_the_cylinder() {
     let radius = 0.4;
     let cut = holed(
         &laid(|u, v| [radius * (u / radius).sin(), v, radius * (u / radius).cos()]),
         &ROUND,
     );
-    let after = Seen::of(
+    let after = MendedScan::of(
         &mended(&packed(&cut.mesh, &[]), &Constraints::default())
             .unwrap()
             .bytes,
     );
     let off: Vec<f64> = after
-        .invented()
+        .new_positions()
         .iter()
         .map(|p| (p.x.hypot(p.z) - f64::from(radius)).abs())
         .collect();
@@ -99,11 +101,11 @@ fn the_same_scan_gives_the_same_bytes() {
 }
 
 #[test]
-fn cloth_told_where_up_is_turns_with_it() {
+fn a_scan_that_is_turned_together_with_up_gets_the_same_patch_turned() {
     let gravity = network(include_bytes!("../../weights/gravity.safetensors"));
     let mender = NetworkMender::new(Networks::new(network(WEIGHTS), vec![gravity]));
     let hanging = holed(sheet(1), &ROUND).mesh;
-    let invented = |turn: Rotation3<f64>, up: Vec3| {
+    let new_positions = |turn: Rotation3<f64>, up: Vec3| {
         let mesh = TriMesh {
             positions: hanging.positions.iter().map(|p| turn * p).collect(),
             faces: hanging.faces.clone(),
@@ -116,7 +118,7 @@ fn cloth_told_where_up_is_turns_with_it() {
         let weights = mended.report.weights.unwrap();
         assert_eq!(weights.name, "gravity");
         assert_eq!(mended.report.notes, [""; 0]);
-        let new = Seen::of(&mended.bytes).invented();
+        let new = MendedScan::of(&mended.bytes).new_positions();
         let back: Vec<Vec3> = new.iter().map(|p| turn.inverse() * p).collect();
         back
     };
@@ -127,21 +129,21 @@ fn cloth_told_where_up_is_turns_with_it() {
     };
     let turn = Rotation3::from_euler_angles(0.4, -0.9, 2.0);
     let (upright, tilted, sideways) = (
-        invented(Rotation3::identity(), Vec3::z()),
-        invented(turn, turn * Vec3::z()),
-        invented(Rotation3::identity(), Vec3::x()),
+        new_positions(Rotation3::identity(), Vec3::z()),
+        new_positions(turn, turn * Vec3::z()),
+        new_positions(Rotation3::identity(), Vec3::x()),
     );
-    // It does not make much of it; but turned with the cloth, it says the same.
+    // The effect of up is small; turned together with the cloth, up gives the same patch.
     let [turned, told] = [&tilted, &sideways].map(|other| apart(&upright, other));
     assert!(told > 1.0e-4, "{told}");
     assert!(turned < 0.2 * told, "{turned}, {told}");
 }
 
 #[test]
-fn texture_coordinates_go_on_through_the_patch() {
+fn texture_coordinates_continue_through_the_patch() {
     let cut = holed(sheet(0), &ROUND);
     let rest: Vec<[f32; 2]> = cut.rest.iter().map(|p| [p.x as f32, p.y as f32]).collect();
-    let after = Seen::of(
+    let after = MendedScan::of(
         &mended(&packed(&cut.mesh, &rest), &Constraints::default())
             .unwrap()
             .bytes,
@@ -153,17 +155,17 @@ fn texture_coordinates_go_on_through_the_patch() {
     let mut inside = 0;
     for uv in part.texcoords[0].iter() {
         let away = (Vec2::new(uv[0].into(), uv[1].into()) - centre).norm();
-        assert!(away < radius + 0.06, "{uv:?} is no place in the hole");
+        assert!(away < radius + 0.06, "{uv:?} is outside the hole");
         inside += usize::from(away < radius * 0.5);
     }
-    // The middle of the hole is in the texture, too: about a quarter of the vertices.
+    // The middle of the hole has texture coordinates, too: about a quarter of the vertices.
     assert!(inside * 10 > part.texcoords[0].len(), "{inside}");
 }
 
 #[test]
-fn a_texture_seam_runs_on_through_the_patch() {
+fn a_texture_seam_continues_through_the_patch() {
     let cut = holed(sheet(1), &ROUND);
-    // Right of the middle the texture is another island, mirrored: vertices on the border between them are doubled.
+    // Right of the middle the texture is a second island, mirrored; vertices on the border between the islands are doubled.
     let mut mesh = cut.mesh.clone();
     let mut texture: Vec<[f32; 2]> = (cut.rest.iter())
         .map(|p| [0.4 * p.x as f32, p.y as f32])
@@ -183,7 +185,7 @@ fn a_texture_seam_runs_on_through_the_patch() {
         }
     }
     let mended = mended(&packed(&mesh, &texture), &Constraints::default()).unwrap();
-    let after = Seen::of(&mended.bytes);
+    let after = MendedScan::of(&mended.bytes);
     assert_eq!(after.loops.len(), 1);
     let part = after.scan.parts.iter().find(|p| p.reconstructed).unwrap();
     let uv = |v: u32| part.texcoords[0][(v - part.vertices.start) as usize];
@@ -198,7 +200,7 @@ fn a_texture_seam_runs_on_through_the_patch() {
 }
 
 #[test]
-fn a_scan_that_is_mended_has_nothing_left_to_mend() {
+fn a_mended_scan_has_no_holes() {
     let first = mended(
         &packed(&holed(sheet(2), &ROUND).mesh, &[]),
         &Constraints::default(),

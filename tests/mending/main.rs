@@ -1,4 +1,4 @@
-//! The whole way from glTF to glTF with the shipped weights, on cloth that our own generator made.
+//! From glTF to glTF with the shipped weights, on cloth that darn's own generator simulated.
 
 mod cloth;
 mod editing;

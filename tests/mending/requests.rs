@@ -1,4 +1,4 @@
-//! What a request may ask of a scan, and what it is told.
+//! Requests: which holes they select, what is refused, and what the report says.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -11,7 +11,7 @@ use darn_mend::{Call, MendError, MendLimits, NetworkMender, mend};
 use darn_net::Networks;
 
 use super::cloth::{
-    ROUND, Seen, WEIGHTS, holed, laid, mended, mender, network, packed, read, sheet,
+    MendedScan, ROUND, WEIGHTS, holed, laid, mended, mender, network, packed, read, sheet,
 };
 
 /// Two sheets side by side, each with a hole; the second is moved along x.
@@ -49,12 +49,12 @@ fn all_holes_are_filled_by_default_and_one_by_id_or_place() {
             [second]
         );
         assert!(one.report.skipped.iter().any(|s| s.code == "not_selected"));
-        assert_eq!(Seen::of(&one.bytes).loops.len(), 3);
+        assert_eq!(MendedScan::of(&one.bytes).loops.len(), 3);
     }
 }
 
 #[test]
-fn a_hole_that_is_not_there_is_named() {
+fn a_selector_of_a_missing_loop_is_refused_by_its_pointer() {
     let bytes = packed(&holed(sheet(0), &ROUND).mesh, &[]);
     let error = mended(&bytes, &asking(&[HoleSelector::Id(7)])).unwrap_err();
     assert_eq!(error.code().word, "constraints_do_not_fit");
@@ -106,7 +106,7 @@ fn a_scan_without_holes_is_refused_and_its_loops_are_named() {
     );
 }
 
-/// The scan with a second node that draws the same mesh: the first's members, and these.
+/// The scan with a second node that draws the same mesh; it is a copy of the first with these members.
 fn drawn_twice(glb: &[u8], members: &[(&str, serde_json::Value)]) -> Vec<u8> {
     let (mut json, bin) = unpacked(glb);
     let mut second = json["nodes"][0].clone();
@@ -148,11 +148,11 @@ fn a_mesh_that_two_nodes_draw_is_mended_once() {
     assert_eq!(mended.report.holes.len(), 1);
     let again = mended.report.skipped.iter().find(|s| s.code == "same_mesh");
     let again = again.expect("the other node's");
-    let after = Seen::of(&mended.bytes);
+    let after = MendedScan::of(&mended.bytes);
     assert_eq!(after.loops.len(), 2, "both nodes show the one patch");
     assert!(after.topology.non_manifold.is_empty());
 
-    let loops = Seen::of(&doubled).loops;
+    let loops = MendedScan::of(&doubled).loops;
     let places = [mended.report.holes[0].id, again.id]
         .map(|id| HoleSelector::Near(loops[id as usize].centroid.into()));
     let error = super::cloth::mended(&doubled, &asking(&places)).unwrap_err();
@@ -161,14 +161,14 @@ fn a_mesh_that_two_nodes_draw_is_mended_once() {
 }
 
 #[test]
-fn a_loose_piece_in_the_hole_is_told_of() {
+fn a_loose_piece_in_the_hole_is_noted() {
     let mut mesh = holed(sheet(0), &ROUND).mesh;
     let alone = mended(&packed(&mesh, &[]), &Constraints::default()).unwrap();
-    let spoken = |notes: &[String]| notes.iter().any(|n| n.contains("loose piece"));
-    assert!(!spoken(&alone.report.holes[0].notes));
+    let noted = |notes: &[String]| notes.iter().any(|n| n.contains("loose piece"));
+    assert!(!noted(&alone.report.holes[0].notes));
 
-    // A shred of the new cloth.
-    let new = Seen::of(&alone.bytes);
+    // A small piece of the new cloth, as a loose piece of the scan.
+    let new = MendedScan::of(&alone.bytes);
     let at = |f: &usize| {
         let corners = new.welded.mesh.faces[*f].map(|v| new.welded.mesh.positions[v as usize]);
         corners.iter().sum::<Vec3>() / 3.0
@@ -183,15 +183,11 @@ fn a_loose_piece_in_the_hole_is_told_of() {
         .unwrap()
         .report;
     assert_eq!(report.holes.len(), 1);
-    assert!(
-        spoken(&report.holes[0].notes),
-        "{:?}",
-        report.holes[0].notes
-    );
+    assert!(noted(&report.holes[0].notes), "{:?}", report.holes[0].notes);
 }
 
 #[test]
-fn cloth_with_a_triangle_for_either_side_gets_a_patch_with_both() {
+fn cloth_with_triangles_on_both_sides_gets_a_patch_with_both() {
     let single = holed(sheet(0), &ROUND).mesh;
     let mut double = single.clone();
     let base = single.positions.len() as u32;
@@ -238,21 +234,21 @@ fn more_holes_than_are_filled_at_once_are_refused() {
 }
 
 #[test]
-fn what_nobody_waits_for_is_given_up() {
+fn a_cancelled_call_is_abandoned() {
     let scan = read(&pair());
     let asked = AtomicUsize::new(0);
-    // Gone when the second hole has been prepared.
-    let gone = || asked.fetch_add(1, Ordering::Relaxed) >= 2;
+    // Cancelled when the second hole has been prepared.
+    let cancelled = || asked.fetch_add(1, Ordering::Relaxed) >= 2;
     let call = Call {
         mender: mender(),
-        cancellation: Cancellation::new(&gone),
+        cancellation: Cancellation::new(&cancelled),
     };
     let error = mend(&scan, &Constraints::default(), call).unwrap_err();
     assert!(matches!(error, MendError::Abandoned), "{error}");
 }
 
 #[test]
-fn an_anchor_draws_the_cloth_towards_it_and_its_distance_is_told() {
+fn an_anchor_moves_the_cloth_towards_it_and_its_distance_is_reported() {
     let bytes = packed(&holed(&laid(|u, v| [u, 0.0, -v]), &ROUND).mesh, &[]);
     let anchor = |position| Constraints {
         anchors: vec![Anchor {
@@ -265,8 +261,8 @@ fn an_anchor_draws_the_cloth_towards_it_and_its_distance_is_told() {
     };
     let height = |c: &Constraints| {
         let mended = mended(&bytes, c).unwrap();
-        let highest = Seen::of(&mended.bytes)
-            .invented()
+        let highest = MendedScan::of(&mended.bytes)
+            .new_positions()
             .iter()
             .map(|p| p.y)
             .fold(f64::MIN, f64::max);
@@ -307,8 +303,8 @@ fn an_anchor_beside_the_hole_is_refused() {
 }
 
 #[test]
-fn a_tube_keeps_its_ends_and_loses_its_hole() {
-    // A closed tube with a square hole: neither end is touched.
+fn the_hole_of_a_tube_is_filled_and_its_ends_stay_open() {
+    // A tube with a square hole.
     let (around, along) = (48u32, 40u32);
     let at = |i: u32, j: u32| {
         let angle = std::f64::consts::TAU * f64::from(i) / f64::from(around);
@@ -330,9 +326,9 @@ fn a_tube_keeps_its_ends_and_loses_its_hole() {
     )
     .unwrap();
     assert_eq!(mended.report.holes.len(), 1);
-    let after = Seen::of(&mended.bytes);
+    let after = MendedScan::of(&mended.bytes);
     assert_eq!(after.loops.len(), 2);
-    for p in after.invented() {
+    for p in after.new_positions() {
         assert!((p.x.hypot(p.z) - 1.0).abs() < 0.05, "{p:?}");
     }
 }
@@ -351,7 +347,7 @@ fn patches_of_two_layers_are_kept_off_each_other() {
         .unwrap()
         .report
         .holes;
-    // The lower layer's new cloth is drawn through the upper layer's.
+    // A grab moves the lower layer's patch through the upper layer's.
     let through = Constraints {
         edits: vec![Edit {
             hole: Some(holes[0].id),
@@ -363,8 +359,8 @@ fn patches_of_two_layers_are_kept_off_each_other() {
         ..Constraints::default()
     };
     let mended = mended(&bytes, &through).unwrap();
-    let seen = Seen::of(&mended.bytes);
-    let highest = seen.invented().iter().map(|p| p.z).fold(0.0, f64::max);
+    let seen = MendedScan::of(&mended.bytes);
+    let highest = seen.new_positions().iter().map(|p| p.z).fold(0.0, f64::max);
     assert!(highest > 0.015, "the grab moved the cloth: {highest}");
     let patch: Vec<u32> = seen.patch.iter().map(|f| *f as u32).collect();
     let cuts = intersections_with(&seen.welded.mesh, &patch).len();
@@ -394,7 +390,7 @@ fn repacked(json: &serde_json::Value, bin: &[u8]) -> Vec<u8> {
     glb
 }
 
-/// The scan under a skin of two joints, of which the second takes over along x; its node stands far off.
+/// The scan with a skin of two joints, of which the second gains weight along x; the mesh's node lies far away.
 fn skinned(glb: &[u8]) -> Vec<u8> {
     use serde_json::json;
     let points = super::cloth::read(glb).surface.positions;
@@ -433,12 +429,12 @@ fn skinned(glb: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn a_patch_of_a_skinned_scan_moves_with_the_cloth_around_it() {
+fn a_patch_of_a_skinned_scan_has_the_weights_of_the_cloth_around_it() {
     let flat = packed(&holed(&laid(|u, v| [u, v, 0.0]), &ROUND).mesh, &[]);
     let mended = mended(&skinned(&flat), &Constraints::default()).unwrap();
-    let invented = Seen::of(&mended.bytes).invented();
+    let new = MendedScan::of(&mended.bytes).new_positions();
     assert!(
-        invented.iter().all(|p| p.x < 1.0),
+        new.iter().all(|p| p.x < 1.0),
         "the transform of a skinned mesh's node does not count"
     );
     let (json, bin) = unpacked(&mended.bytes);
@@ -461,7 +457,7 @@ fn a_patch_of_a_skinned_scan_moves_with_the_cloth_around_it() {
     assert_eq!(span("JOINTS_0").len(), 8 * positions.len());
     for (at, weights) in positions.iter().zip(weights) {
         assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-6);
-        // No point of the hole is further from its rim than its radius, 0.13.
+        // No point of the hole is farther from its rim than its radius, 0.13.
         assert!((weights[1] - at[0]).abs() < 0.2, "{at:?} {weights:?}");
     }
 }

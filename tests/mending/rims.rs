@@ -1,4 +1,4 @@
-//! Rims that touch themselves in a point, as moths leave them: welded there is one loop that comes to the same place more than once.
+//! Rims that touch themselves in a point: when welded, such a rim is one loop that visits a point more than once.
 
 use std::collections::HashSet;
 
@@ -6,10 +6,10 @@ use darn_contract::Constraints;
 use darn_geometry::mesh::loops::LoopKind;
 use darn_geometry::mesh::{TriMesh, Vec3};
 
-use super::cloth::{Seen, mended, packed};
+use super::cloth::{MendedScan, mended, packed};
 
-/// A wavy sheet of squares, two triangles each: `#` is whole, `/` has its lower triangle only, `7` its upper one, `.` none.
-fn eaten(rows: &[String]) -> TriMesh {
+/// A wavy sheet of squares of two triangles each: `#` has both, `/` only the lower one, `7` only the upper one, `.` none.
+fn sheet_of(rows: &[String]) -> TriMesh {
     let n = rows.len();
     let at = |k: usize| {
         let [u, v] = [k % (n + 1), k / (n + 1)].map(|x| x as f64 / n as f64);
@@ -48,11 +48,11 @@ fn two_squares() -> Vec<String> {
     (0..18).map(row).collect()
 }
 
-/// Mends a sheet and looks at its triangles by where their corners are: closed and manifold wherever there is a patch.
+/// Mends a sheet and checks its triangles, by the positions of their corners: closed and manifold wherever there is a patch.
 fn mends_soundly(rows: &[String]) {
-    let bytes = packed(&eaten(rows), &[]);
+    let bytes = packed(&sheet_of(rows), &[]);
     let mended = mended(&bytes, &Constraints::default()).expect("a closed sheet");
-    let seen = Seen::of(&mended.bytes);
+    let seen = MendedScan::of(&mended.bytes);
     let surface = &seen.scan.surface;
     let place = |v: u32| {
         let p = surface.positions[v as usize];

@@ -11,4 +11,5 @@ pub mod flatten;
 pub mod grid;
 pub mod mesh;
 pub mod patch;
+pub mod polygon;
 pub mod smooth;

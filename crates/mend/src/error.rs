@@ -1,4 +1,4 @@
-//! Why a scan could not be mended, and the stable word programs know each reason by.
+//! Why a scan could not be mended, and the code of each reason: a stable word for programs.
 
 use darn_contract::{Code, FieldError, codes, v1};
 use darn_geometry::flatten::FlattenError;
@@ -10,24 +10,27 @@ use darn_net::NetError;
 /// Why a scan could not be mended.
 #[derive(Debug, thiserror::Error)]
 pub enum MendError {
+    /// The bytes could not be read as a scan.
+    #[error(transparent)]
+    Unreadable(ScanError),
     /// Constraints that do not fit this scan.
-    #[error("{} constraint(s) do not fit this scan: {}", .0.len(), told(.0))]
+    #[error("{} constraint(s) do not fit this scan: {}", .0.len(), listed(.0))]
     Constraints(Vec<FieldError>),
     /// Hard anchors that the cloth does not meet.
-    #[error("{} anchor(s) cannot be met: {}", .0.len(), told(.0))]
+    #[error("{} anchor(s) cannot be met: {}", .0.len(), listed(.0))]
     OutOfReach(Vec<FieldError>),
-    /// Nothing to fill.
-    #[error("the scan has no hole to fill{}", left(.skipped))]
+    /// The scan has no hole to fill.
+    #[error("the scan has no hole to fill{}", reasons(.skipped))]
     NoHoles {
-        /// Its loops and why they are left as they are.
+        /// Its loops, and why each is left as it is.
         skipped: Vec<v1::Skipped>,
     },
-    /// More holes than are filled at once.
+    /// The request asks for more holes than are filled at once.
     #[error(
         "{found} holes are to be filled, and at most {limit} are at once; choose among them by `holes`"
     )]
     TooManyHoles {
-        /// Holes to fill.
+        /// How many holes the request asks for.
         found: usize,
         /// How many are filled at once.
         limit: usize,
@@ -38,7 +41,7 @@ pub enum MendError {
         /// Id of the hole's loop.
         hole: u32,
     },
-    /// No disk of cloth around the hole.
+    /// The cloth around the hole is no disk.
     #[error("hole {hole}: {source}")]
     Region {
         /// Id of the hole's loop.
@@ -46,7 +49,7 @@ pub enum MendError {
         /// Why.
         source: RegionError,
     },
-    /// The cloth around the hole does not lie flat.
+    /// The cloth around the hole cannot be laid flat.
     #[error("hole {hole}: {source}")]
     Flatten {
         /// Id of the hole's loop.
@@ -64,7 +67,7 @@ pub enum MendError {
         /// Cells the cloth covers.
         known: usize,
     },
-    /// The hole is so small that no cell of the grid lies in it.
+    /// No cell of the grid lies in the hole.
     #[error(
         "hole {hole} is so narrow that no cell of the grid lies in it; there is no place to search"
     )]
@@ -95,9 +98,21 @@ pub enum MendError {
 }
 
 impl MendError {
-    /// Its row in the table of error codes.
+    /// The error's row in the table of codes. This is the only place that gives errors of mending their codes.
     pub fn code(&self) -> Code {
         match self {
+            MendError::Unreadable(error) => match error {
+                ScanError::Container { .. } => codes::NOT_A_GLTF,
+                ScanError::Invalid { .. } => codes::INVALID_GLTF,
+                ScanError::IndexOutOfRange { .. } => codes::INDEX_OUT_OF_RANGE,
+                ScanError::NotFinite { .. } => codes::POSITION_NOT_FINITE,
+                ScanError::Unsupported { .. } => codes::UNSUPPORTED_EXTENSION,
+                ScanError::External { .. } => codes::EXTERNAL_DATA,
+                ScanError::Limit { .. } => codes::SCAN_TOO_LARGE,
+                ScanError::NoTriangles => codes::NO_TRIANGLES,
+                ScanError::Singular { .. } => codes::SINGULAR_TRANSFORM,
+                ScanError::InvalidPatch { .. } => codes::INTERNAL,
+            },
             MendError::Constraints(_) => codes::CONSTRAINTS_DO_NOT_FIT,
             MendError::OutOfReach(_) => codes::ANCHOR_OUT_OF_REACH,
             MendError::NoHoles { .. } => codes::NO_HOLES,
@@ -124,7 +139,7 @@ impl MendError {
         }
     }
 
-    /// The constraints it is about.
+    /// The fields of the constraints that the error is about.
     pub fn fields(&self) -> Vec<FieldError> {
         match self {
             MendError::Constraints(fields) | MendError::OutOfReach(fields) => fields.clone(),
@@ -133,15 +148,12 @@ impl MendError {
     }
 }
 
-fn told(fields: &[FieldError]) -> String {
-    let each: Vec<String> = fields
-        .iter()
-        .map(|f| format!("{}: {}", f.pointer, f.detail))
-        .collect();
+fn listed(fields: &[FieldError]) -> String {
+    let each: Vec<String> = fields.iter().map(FieldError::to_string).collect();
     each.join("; ")
 }
 
-fn left(skipped: &[v1::Skipped]) -> String {
+fn reasons(skipped: &[v1::Skipped]) -> String {
     match skipped {
         [] => ": its surface is closed, without any boundary loop".to_owned(),
         loops => {

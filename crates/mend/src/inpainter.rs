@@ -1,25 +1,27 @@
-//! Which of the loaded networks imagines the cloth, and the frame it wants to see it in.
+//! The network that predicts a request's cloth, with the up direction it is told.
 
+use crate::error::MendError;
 use darn_contract::{FieldError, v1};
 use darn_geometry::grid::NormalGrid;
 use darn_net::{
     AnchorLoss, AnchorProblem, Averaging, FillRequest, NetError, Network, Networks, WeightsCard,
 };
 
-/// The network for a request that gives an up direction and names no weights.
+/// Name of the network for a request that gives an up direction and names no weights.
 const FOR_UP: &str = "gravity";
 
-/// A network and how its cloth is turned.
+/// A network, and the up direction of a request.
+#[derive(Clone)]
 pub struct Inpainter<'a> {
     network: &'a Network,
-    voice: Voice,
-    /// What a person should know about the choice.
+    key: FillKey,
+    /// What a person should know about the choice of network.
     pub note: Option<String>,
 }
 
-/// What decides an inpainter's answers: two of the same voice give the same.
+/// What decides an inpainter's answers to a grid: inpainters with equal keys answer alike.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Voice {
+pub struct FillKey {
     name: String,
     up: Option<[f64; 3]>,
 }
@@ -29,7 +31,15 @@ impl<'a> Inpainter<'a> {
     ///
     /// # Errors
     /// At `/weights`: a name that is not loaded, or weights that need `up` without it.
-    pub fn chosen(
+    pub fn choose(
+        networks: &'a Networks,
+        weights: Option<&str>,
+        up: Option<[f64; 3]>,
+    ) -> Result<Inpainter<'a>, MendError> {
+        Self::chosen(networks, weights, up).map_err(|wrong| MendError::Constraints(vec![wrong]))
+    }
+
+    fn chosen(
         networks: &'a Networks,
         weights: Option<&str>,
         up: Option<[f64; 3]>,
@@ -40,23 +50,23 @@ impl<'a> Inpainter<'a> {
             (None, None) => networks.default(),
         };
         let card = network.card();
-        let (name, given) = (&card.name, card.architecture.frame.knows_up());
-        if given && up.is_none() {
+        let (name, knows_up) = (&card.name, card.architecture.frame.knows_up());
+        if knows_up && up.is_none() {
             let detail = format!(
                 "`{name}` was trained on cloth that hangs; it needs `up`, the direction against gravity"
             );
             return Err(FieldError::new("/weights", detail));
         }
-        let note = (up.is_some() && !given).then(|| match weights {
+        let note = (up.is_some() && !knows_up).then(|| match weights {
             Some(_) => format!("`{name}` knows no up; the direction given had no effect"),
             None => format!(
                 "no weights `{FOR_UP}` are loaded; `{name}` filled the holes, and `up` had no effect"
             ),
         });
-        let up = up.filter(|_| given);
+        let up = up.filter(|_| knows_up);
         Ok(Inpainter {
             network,
-            voice: Voice {
+            key: FillKey {
                 name: name.clone(),
                 up,
             },
@@ -65,8 +75,8 @@ impl<'a> Inpainter<'a> {
     }
 
     /// What decides its answers.
-    pub fn voice(&self) -> &Voice {
-        &self.voice
+    pub fn key(&self) -> &FillKey {
+        &self.key
     }
 
     /// What its weights are.
@@ -83,7 +93,10 @@ impl<'a> Inpainter<'a> {
         }
     }
 
-    /// Predicts every cell of every grid, in the network's units.
+    /// Predicts every cell of every grid, in the network's units; one list of 4096 positions for each grid.
+    ///
+    /// # Errors
+    /// What [`Network::fill`] refuses.
     pub fn fill(
         &self,
         grids: &[NormalGrid],
@@ -91,27 +104,36 @@ impl<'a> Inpainter<'a> {
     ) -> Result<Vec<Vec<[f32; 3]>>, NetError> {
         self.network.fill(&FillRequest {
             grids,
-            up: self.voice.up,
+            up: self.key.up,
             averaging,
         })
     }
 
-    /// A grid and a target, both in the network's units, as the network sees them.
+    /// The anchor search's problem: a grid and a target, both in the network's units, as the network sees them.
+    ///
+    /// # Errors
+    /// A grid of another size.
     pub fn anchor_problem(
         &self,
         grid: &NormalGrid,
         target: [f32; 3],
     ) -> Result<AnchorProblem, NetError> {
-        self.network.anchor_problem(grid, target, self.voice.up)
+        self.network.anchor_problem(grid, target, self.key.up)
     }
 
-    /// Losses of an anchor at uvs.
+    /// The loss of an anchor at each of the uvs, squared cells.
+    ///
+    /// # Errors
+    /// Values that make the answer overflow.
     pub fn losses(&self, problem: &AnchorProblem, uvs: &[[f32; 2]]) -> Result<Vec<f32>, NetError> {
         self.network.anchor_losses(problem, uvs)
     }
 
-    /// The same with gradients.
-    pub fn slopes(
+    /// The same losses with their gradients.
+    ///
+    /// # Errors
+    /// As of [`Inpainter::losses`].
+    pub fn gradients(
         &self,
         problem: &AnchorProblem,
         uvs: &[[f32; 2]],

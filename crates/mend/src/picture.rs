@@ -1,9 +1,9 @@
-//! A small picture of a hole's chart: the cloth around it light, the new cloth tinted, both shaded by their folds, the rim as a line.
+//! A small picture of a hole's chart: the scanned cloth light, the new cloth tinted, both shaded by their folds, the rim as a line.
 
 use image::{Rgb, RgbImage};
 
-use super::prepared::Prepared;
 use crate::edit::map::png;
+use crate::hole::Hole;
 use darn_geometry::mesh::{Vec2, Vec3};
 use darn_geometry::patch::Patch;
 
@@ -14,14 +14,14 @@ const CLOTH: [f64; 3] = [214.0, 219.0, 228.0];
 const MENDED: [f64; 3] = [236.0, 170.0, 118.0];
 const RIM: Rgb<u8> = Rgb([120, 60, 30]);
 
-/// Draws the chart as PNG: u runs right, v up. The light comes from one side, so that every fold has a bright and a dark face.
+/// Draws the chart as PNG: u runs right, v up. The light comes from one side, so that every fold has a bright and a dark side.
 ///
 /// # Errors
-/// What the encoder says; it has no reason to.
-pub fn chart(prepared: &Prepared, patch: &Patch) -> Result<Vec<u8>, image::ImageError> {
+/// Whatever the encoder fails with.
+pub fn chart_png(hole: &Hole, patch: &Patch) -> Result<Vec<u8>, image::ImageError> {
     let mut image = RgbImage::from_pixel(SIDE, SIDE, tinted(PAPER, 1.0));
-    let chart = &prepared.chart;
-    let region = &prepared.region.mesh;
+    let chart = &hole.chart;
+    let region = &hole.region.mesh;
     let light = light(&region.faces, &region.positions, &chart.flat);
     let mut paint = |faces: &[[u32; 3]], positions: &[Vec3], flat: &[Vec2], colour| {
         for face in faces {
@@ -36,8 +36,8 @@ pub fn chart(prepared: &Prepared, patch: &Patch) -> Result<Vec<u8>, image::Image
     paint(&patch.faces, &patch.positions, &patch.flat, MENDED);
     let rim = patch.rim.len();
     for k in 0..rim {
-        let ends = [k, (k + 1) % rim].map(|k| pixel(chart.frame.uv(patch.flat[k])));
-        line(&mut image, ends);
+        let end = |k: usize| pixel(chart.frame.uv(patch.flat[k]));
+        line(&mut image, end(k), end((k + 1) % rim));
     }
     png(&image)
 }
@@ -83,11 +83,12 @@ fn triangle(image: &mut RgbImage, corners: [Vec2; 3], colour: Rgb<u8>) {
     }
 }
 
-fn line(image: &mut RgbImage, ends: [Vec2; 2]) {
-    let way = ends[1] - ends[0];
+/// Draws a line of the rim.
+fn line(image: &mut RgbImage, from: Vec2, to: Vec2) {
+    let way = to - from;
     let steps = (2.0 * way.amax()).ceil().clamp(1.0, 2.0 * f64::from(SIDE)) as u32;
     for k in 0..=steps {
-        let at = ends[0] + way * (f64::from(k) / f64::from(steps));
+        let at = from + way * (f64::from(k) / f64::from(steps));
         let (x, y) = (at.x.max(0.0) as u32, at.y.max(0.0) as u32);
         if x < SIDE && y < SIDE {
             image.put_pixel(x, y, RIM);

@@ -1,27 +1,31 @@
-//! The port's [`Mender`] on loaded networks: reads the scan, mends it, and sorts refusals by whose fault they are.
+//! The port's [`Mender`] on loaded networks: reads the scan, mends it, and turns errors into refusals.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use darn_contract::port::{Cancellation, EditSession, Mended, Mender, PatchForm, Patches, Refusal};
-use darn_contract::{Constraints, Search, codes, error_chain, v1};
-use darn_gltf_scan::{Scan, ScanError};
+use darn_contract::{Constraints, Search, error_chain, v1};
+use darn_gltf_scan::Scan;
 
-use super::{Call, MendError, NetworkMender, ScanSession, add_read_time};
+use crate::error::MendError;
+use crate::mender::{Call, NetworkMender};
+use crate::session::ScanSession;
+use crate::timings::add_read_time;
 
-/// The scan of the warm-up mend: small, and whole and real.
+/// The scan that the warm-up mends: a real one, small.
 const EXAMPLE: &[u8] = include_bytes!("../../../examples/scarf_hole.glb");
 
-/// A mender that sessions share, behind the port.
+/// A mender behind the port; sessions share it.
 #[derive(Debug, Clone)]
 pub struct SharedMender(pub Arc<NetworkMender>);
 
 impl SharedMender {
-    /// A scan, and how long reading it took.
+    /// Reads a scan; also returns how long that took.
     fn scan(&self, bytes: Bytes) -> Result<(Scan, Duration), Refusal> {
         let started = Instant::now();
-        let scan = Scan::read(bytes, &self.0.scan_limits).map_err(|error| of_scan(&error))?;
+        let scan = Scan::read(bytes, &self.0.scan_limits)
+            .map_err(|error| refusal(MendError::Unreadable(error)))?;
         Ok((scan, started.elapsed()))
     }
 
@@ -42,7 +46,7 @@ impl Mender for SharedMender {
     ) -> Result<Mended, Refusal> {
         let (scan, read) = self.scan(scan)?;
         let mut mended =
-            super::mend(&scan, constraints, self.call(cancellation)).map_err(of_mend)?;
+            crate::mend(&scan, constraints, self.call(cancellation)).map_err(refusal)?;
         add_read_time(&mut mended.report.timings, read);
         Ok(mended)
     }
@@ -54,7 +58,7 @@ impl Mender for SharedMender {
         cancellation: Cancellation<'_>,
     ) -> Result<v1::AnchorFound, Refusal> {
         let (scan, _) = self.scan(scan)?;
-        super::optimize_anchor(&scan, search, self.call(cancellation)).map_err(of_mend)
+        crate::optimize_anchor(&scan, search, self.call(cancellation)).map_err(refusal)
     }
 
     fn mend_to_target(
@@ -65,7 +69,7 @@ impl Mender for SharedMender {
     ) -> Result<Mended, Refusal> {
         let (scan, read) = self.scan(scan)?;
         let mut mended =
-            super::mend_to_target(&scan, search, self.call(cancellation)).map_err(of_mend)?;
+            crate::mend_to_target(&scan, search, self.call(cancellation)).map_err(refusal)?;
         add_read_time(&mut mended.report.timings, read);
         Ok(mended)
     }
@@ -78,12 +82,12 @@ impl Mender for SharedMender {
     ) -> Result<Box<dyn EditSession>, Refusal> {
         let (scan, _) = self.scan(scan)?;
         let session = ScanSession::open(scan, constraints, Arc::clone(&self.0), cancellation);
-        Ok(Box::new(session.map_err(of_mend)?))
+        Ok(Box::new(session.map_err(refusal)?))
     }
 
     fn find_holes(&self, scan: Bytes) -> Result<v1::HolesReport, Refusal> {
         let (scan, read) = self.scan(scan)?;
-        let mut found = super::find_holes(&scan);
+        let mut found = crate::find_holes(&scan);
         add_read_time(&mut found.timings, read);
         Ok(found)
     }
@@ -115,9 +119,9 @@ impl EditSession for ScanSession {
     ) -> Result<Patches, Refusal> {
         let call = self.call(cancellation);
         let (bytes, report) = match form {
-            PatchForm::Glb => call.glb(constraints).map_err(of_mend)?,
+            PatchForm::Glb => call.glb(constraints).map_err(refusal)?,
             PatchForm::Positions => {
-                let (positions, report) = call.positions(constraints).map_err(of_mend)?;
+                let (positions, report) = call.positions(constraints).map_err(refusal)?;
                 let numbers = positions.iter().flatten().flat_map(|p| [p.x, p.y, p.z]);
                 let bytes = numbers.flat_map(|x| (x as f32).to_le_bytes());
                 (bytes.collect(), report)
@@ -131,7 +135,7 @@ impl EditSession for ScanSession {
         constraints: &Constraints,
         cancellation: Cancellation<'_>,
     ) -> Result<Mended, Refusal> {
-        self.call(cancellation).mended(constraints).map_err(of_mend)
+        self.call(cancellation).mended(constraints).map_err(refusal)
     }
 
     fn optimize_anchor(
@@ -140,30 +144,38 @@ impl EditSession for ScanSession {
         cancellation: Cancellation<'_>,
     ) -> Result<v1::AnchorFound, Refusal> {
         let found = self.call(cancellation).optimize_anchor(search);
-        found.map_err(of_mend)
+        found.map_err(refusal)
     }
 }
 
-fn of_scan(error: &ScanError) -> Refusal {
-    let code = match error {
-        ScanError::Container { .. } => codes::NOT_A_GLTF,
-        ScanError::Invalid { .. } => codes::INVALID_GLTF,
-        ScanError::IndexOutOfRange { .. } => codes::INDEX_OUT_OF_RANGE,
-        ScanError::NotFinite { .. } => codes::POSITION_NOT_FINITE,
-        ScanError::Unsupported { .. } => codes::UNSUPPORTED_EXTENSION,
-        ScanError::External { .. } => codes::EXTERNAL_DATA,
-        ScanError::Limit { .. } => codes::SCAN_TOO_LARGE,
-        ScanError::NoTriangles => codes::NO_TRIANGLES,
-        ScanError::Singular { .. } => codes::SINGULAR_TRANSFORM,
-        ScanError::InvalidPatch { .. } => codes::INTERNAL,
-    };
-    Refusal::new(code, error.to_string())
-}
-
-fn of_mend(error: MendError) -> Refusal {
+/// An error as the port hands it on.
+fn refusal(error: MendError) -> Refusal {
     Refusal {
         code: error.code(),
         detail: error_chain(&error),
         fields: error.fields(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use darn_contract::codes;
+    use darn_geometry::mesh::region::RegionError;
+
+    #[test]
+    fn a_refusal_has_the_codes_of_its_error_and_names_a_cause_once() {
+        let error = MendError::Region {
+            hole: 3,
+            source: RegionError::TooLarge {
+                rim: 3,
+                coordinate: 1e120,
+                limit: 1e100,
+            },
+        };
+        let text = error.to_string();
+        let refusal = refusal(error);
+        assert_eq!(refusal.code, codes::COORDINATES_TOO_LARGE);
+        assert_eq!(refusal.detail, text);
     }
 }

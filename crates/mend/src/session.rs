@@ -1,38 +1,41 @@
-//! A scan that is kept for editing: owned, prepared once, asked many times; the same answers as single calls.
+//! A scan that is kept for editing: prepared once, then asked many times; it gives the same answers as single calls.
 
 use std::sync::Arc;
 
-use super::opened::{Opened, Patched};
-use super::prepared::Prepared;
-use super::{Call, MendError, NetworkMender, picture};
+use crate::error::MendError;
+use crate::hole::Hole;
+use crate::hole_report::FilledHole;
+use crate::mender::{Call, NetworkMender};
+use crate::picture;
+use crate::scan_holes::{FilledScan, ScanHoles};
 use darn_contract::port::{Cancellation, Mended};
 use darn_contract::{Constraints, FieldError, Search, v1};
 use darn_geometry::mesh::{Vec2, Vec3};
 use darn_gltf_scan::export::{NewMesh, meshes};
 use darn_gltf_scan::{PatchPoint, PatchPrimitive, Scan};
 
-/// A scan with its holes laid flat.
+/// A scan with its holes prepared, the mender that fills them, and the description of both.
 pub struct ScanSession {
     scan: Scan,
-    opened: Opened,
+    holes: ScanHoles,
     mender: Arc<NetworkMender>,
     described: v1::Session,
 }
 
 impl ScanSession {
-    /// Prepares the holes that `asked` chooses and fills them once without constraints.
+    /// Prepares the holes that the constraints choose and fills them once without anchors and edits.
     ///
     /// # Errors
-    /// As [`mend`](super::mend); and when `asked` has anchors or edits, which belong to what is asked of the session later.
+    /// As [`mend`](crate::mend); and `Constraints` for anchors or edits, which belong to later requests.
     pub fn open(
         scan: Scan,
-        asked: &Constraints,
+        constraints: &Constraints,
         mender: Arc<NetworkMender>,
         cancellation: Cancellation,
     ) -> Result<ScanSession, MendError> {
         let entries = [
-            ("/anchors", asked.anchors.len()),
-            ("/edits", asked.edits.len()),
+            ("/anchors", constraints.anchors.len()),
+            ("/edits", constraints.edits.len()),
         ];
         let early: Vec<FieldError> = (entries.iter())
             .filter(|(_, count)| *count > 0)
@@ -48,17 +51,17 @@ impl ScanSession {
             mender: &mender,
             cancellation,
         };
-        let opened = Opened::new(&scan, asked, call)?;
-        let described = described(&opened, &scan, call)?;
+        let holes = ScanHoles::open(&scan, constraints, call)?;
+        let described = described(&holes, &scan, call)?;
         Ok(ScanSession {
             scan,
-            opened,
+            holes,
             mender,
             described,
         })
     }
 
-    /// What it is; `id` and `idle_seconds` are whoever keeps it to fill in.
+    /// The session in the contract's words, without `id` and `idle_seconds`, which are the caller's to fill in.
     pub fn described(&self) -> v1::Session {
         v1::Session {
             bytes: self.bytes() as u64,
@@ -66,12 +69,12 @@ impl ScanSession {
         }
     }
 
-    /// Bytes of memory it holds, about, and rather more than less: half as much again as is counted. Allocators round up, and factors fill
-    /// in more than is foreseen: a thousand abandoned sessions of 4.2 MiB took 6.0 each.
+    /// Bytes of memory that it holds, estimated: half as much again as is counted, as allocators round up and sparse factors fill in. Measured:
+    /// a thousand sessions counted at 4.2 MiB each took 6.0 MiB each.
     pub fn bytes(&self) -> usize {
-        let holes: usize = self.opened.holes.iter().map(Prepared::bytes).sum();
+        let holes: usize = self.holes.holes.iter().map(Hole::bytes).sum();
         let described: usize = self.described.holes.iter().map(hole_bytes).sum();
-        let counted = self.scan.bytes_held() + self.opened.cloth.bytes() + holes + described;
+        let counted = self.scan.bytes_held() + self.holes.welded.bytes() + holes + described;
         counted + counted / 2
     }
 
@@ -86,17 +89,17 @@ impl ScanSession {
         }
     }
 
-    fn reported(&self, patched: Patched) -> v1::Report {
-        let mut report = self.opened.report(&self.scan, patched);
-        self.forget_preparation(&mut report);
+    fn report(&self, filled: FilledScan) -> v1::Report {
+        let mut report = self.holes.report(&self.scan, filled);
+        self.remove_preparation(&mut report);
         report
     }
 
-    /// Takes out of a report the time that was spent when the session was opened.
-    fn forget_preparation(&self, report: &mut v1::Report) {
+    /// Removes the time of opening the session from a report.
+    fn remove_preparation(&self, report: &mut v1::Report) {
         if let Some(timings) = &mut report.timings {
-            timings.holes -= self.opened.prepare_ms;
-            timings.total -= self.opened.prepare_ms + timings.weld + timings.loops;
+            timings.holes -= self.holes.prepare_ms;
+            timings.total -= self.holes.prepare_ms + timings.weld + timings.loops;
             (timings.weld, timings.loops) = (0.0, 0.0);
         }
         for timings in report.holes.iter_mut().flat_map(|h| &mut h.timings) {
@@ -105,7 +108,7 @@ impl ScanSession {
     }
 }
 
-/// A call to a session.
+/// A session and its caller's cancellation check.
 #[derive(Clone, Copy)]
 pub struct SessionCall<'a> {
     session: &'a ScanSession,
@@ -113,85 +116,83 @@ pub struct SessionCall<'a> {
 }
 
 impl<'a> SessionCall<'a> {
-    /// The whole scan mended: the bytes that [`mend`](super::mend) gives for the same constraints.
-    ///
-    /// What the opening chose (holes, weights, up) may be left out of `constraints`.
+    /// The whole scan mended: the bytes that [`mend`](crate::mend) gives for the same constraints. Holes, weights and up are those of the opening
+    /// where `constraints` leaves them out.
     ///
     /// # Errors
-    /// As [`mend`](super::mend), `Abandoned` among them.
+    /// As [`mend`](crate::mend).
     pub fn mended(&self, constraints: &Constraints) -> Result<Mended, MendError> {
-        let mut mended = self
-            .session
-            .opened
-            .mended(&self.session.scan, constraints, self.call)?;
-        self.session.forget_preparation(&mut mended.report);
+        let filled = self.filled(constraints)?;
+        let mut mended = self.session.holes.mended(&self.session.scan, filled)?;
+        self.session.remove_preparation(&mut mended.report);
         Ok(mended)
     }
 
     /// The patches alone, as a GLB with one mesh for each hole, in order of id.
     ///
     /// # Errors
-    /// As [`mend`](super::mend), `Abandoned` among them.
+    /// As [`mend`](crate::mend).
     pub fn glb(&self, constraints: &Constraints) -> Result<(Vec<u8>, v1::Report), MendError> {
-        let patched = self.patched(constraints)?;
-        let additions = self
-            .session
-            .opened
-            .additions(&self.session.scan, &patched)?;
+        let filled = self.filled(constraints)?;
+        let additions = (self.session.holes).additions(&self.session.scan, &filled);
         let bytes = glb(&self.session.scan, &additions)?;
-        Ok((bytes, self.session.reported(patched)))
+        Ok((bytes, self.session.report(filled)))
     }
 
-    /// The positions of the patches' vertices, hole after hole in order of id, each in the order of its `patch_uvs`.
+    /// The positions of the patches' vertices in scene space: one list for each hole, in order of id, each in the order of its `patch_uvs`.
     ///
     /// # Errors
-    /// As [`mend`](super::mend), `Abandoned` among them.
+    /// As [`mend`](crate::mend).
     pub fn positions(
         &self,
         constraints: &Constraints,
     ) -> Result<(Vec<Vec<Vec3>>, v1::Report), MendError> {
-        let patched = self.patched(constraints)?;
-        let each = patched.holes.iter();
-        let positions = each.map(|(_, made)| made.patch.positions.clone());
-        Ok((positions.collect(), self.session.reported(patched)))
+        let filled = self.filled(constraints)?;
+        let each = filled.holes.iter();
+        let positions = each.map(|hole| hole.patch.positions.clone());
+        Ok((positions.collect(), self.session.report(filled)))
     }
 
     /// Searches where on a hole's grid a point in space belongs, with the weights of the opening.
     ///
     /// # Errors
-    /// At `/hole` and `/start` when they do not fit, and whatever the network fails with.
+    /// At `/hole` and `/start` when they do not fit; a failure of the network; `Abandoned`.
     pub fn optimize_anchor(&self, search: &Search) -> Result<v1::AnchorFound, MendError> {
-        self.session.opened.search(search, self.call)
+        self.session.holes.search(search, self.call)
     }
 
-    fn patched(&self, constraints: &Constraints) -> Result<Patched<'a>, MendError> {
-        (self.session.opened).patched(&self.session.scan, constraints, self.call)
+    fn filled(&self, constraints: &Constraints) -> Result<FilledScan<'a>, MendError> {
+        (self.session.holes).filled_with(&self.session.scan, constraints, self.call)
     }
 }
 
-/// What stays the same, and the cloth as it is without constraints.
-fn described(opened: &Opened, scan: &Scan, call: Call) -> Result<v1::Session, MendError> {
-    let patched = opened.patched(scan, &Constraints::default(), call)?;
+/// What stays the same during a session, and the cloth without constraints.
+fn described(opened: &ScanHoles, scan: &Scan, call: Call) -> Result<v1::Session, MendError> {
+    let filled = opened.filled(call)?;
     let mut holes = Vec::new();
-    for (prepared, made) in &patched.holes {
-        let unedited = prepared.unedited(&patched.inpainter, &call.mender.limits)?;
-        let patch = &made.patch;
+    for FilledHole {
+        hole,
+        patch,
+        report,
+    } in &filled.holes
+    {
+        let unedited = hole.unedited(&filled.inpainter, &call.mender.limits)?;
         let rim = patch.rim.len();
-        let uv = |p: &Vec2| <[f64; 2]>::from(prepared.chart.frame.uv(*p));
-        let png = picture::chart(prepared, patch).map_err(MendError::Picture)?;
+        let uv = |p: &Vec2| <[f64; 2]>::from(hole.chart.frame.uv(*p));
+        let png = picture::chart_png(hole, patch).map_err(MendError::Picture)?;
         holes.push(v1::SessionHole {
-            id: prepared.id,
+            id: hole.id,
             rim_positions: flat(&patch.positions[..rim]),
             rim_uvs: patch.flat[..rim].iter().flat_map(uv).collect(),
             grid_positions: flat(&unedited.filled),
-            hole_cells: prepared.cells.indices().iter().map(|k| *k as u32).collect(),
+            hole_cells: hole.cells.indices().iter().map(|k| *k as u32).collect(),
             patch_faces: patch.faces.iter().flatten().copied().collect(),
             patch_uvs: patch.flat.iter().flat_map(uv).collect(),
             chart_png: png.into(),
-            report: Some(made.report.clone()),
+            report: Some(report.clone()),
         });
     }
-    let report = opened.report(scan, patched);
+    let report = opened.report(scan, filled);
     Ok(v1::Session {
         holes,
         skipped: report.skipped,
@@ -201,10 +202,12 @@ fn described(opened: &Opened, scan: &Scan, call: Call) -> Result<v1::Session, Me
     })
 }
 
+/// `x, y, z` of each point, one after another.
 fn flat(points: &[Vec3]) -> Vec<f64> {
     points.iter().flat_map(|p| [p.x, p.y, p.z]).collect()
 }
 
+/// Bytes of memory of a hole's description.
 fn hole_bytes(hole: &v1::SessionHole) -> usize {
     let numbers = hole.rim_positions.len()
         + hole.rim_uvs.len()
@@ -213,7 +216,7 @@ fn hole_bytes(hole: &v1::SessionHole) -> usize {
     8 * numbers + 4 * (hole.hole_cells.len() + hole.patch_faces.len()) + hole.chart_png.len()
 }
 
-/// Patches as meshes of their own, in scene space, with the scan's first texture coordinates carried on.
+/// Patches as a GLB: a mesh for each, in scene space, with its first texture coordinates.
 fn glb(scan: &Scan, additions: &[PatchPrimitive]) -> Result<Vec<u8>, MendError> {
     let place = |point: &PatchPoint| -> [f32; 3] {
         match point {
@@ -245,4 +248,62 @@ fn glb(scan: &Scan, additions: &[PatchPrimitive]) -> Result<Vec<u8>, MendError> 
         })
         .collect();
     Ok(meshes(&fresh)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{anchor_at, grab_at, mender, scan_of};
+    use darn_contract::HoleSelector;
+    use darn_geometry::mesh::shapes::holed_sheet;
+
+    #[test]
+    fn a_session_mends_and_refuses_as_a_single_call_does() {
+        let scan = || scan_of(&holed_sheet(24, 0.15));
+        let (mender, never) = (mender(), Cancellation::NEVER);
+        let opening = Constraints::default();
+        let session = ScanSession::open(scan(), &opening, Arc::clone(mender), never).unwrap();
+        let hole = session.described().holes[0].id;
+        let asked = Constraints {
+            anchors: vec![anchor_at(Some(hole))],
+            edits: vec![grab_at(None)],
+            ..Constraints::default()
+        };
+        let no_such_hole = Constraints {
+            holes: vec![HoleSelector::Id(77)],
+            ..asked.clone()
+        };
+        let no_such_owner = Constraints {
+            anchors: vec![anchor_at(Some(77))],
+            ..asked.clone()
+        };
+        let no_such_weights = Constraints {
+            weights: Some("silk".into()),
+            ..asked.clone()
+        };
+        let requests = [opening, asked, no_such_hole, no_such_owner, no_such_weights];
+        for constraints in requests {
+            let kept = session.call(never).mended(&constraints);
+            let single = crate::mend(&scan(), &constraints, mender);
+            match (kept, single) {
+                (Ok(kept), Ok(single)) => assert!(kept.bytes == single.bytes),
+                (Err(kept), Err(single)) => assert_eq!(kept.to_string(), single.to_string()),
+                _ => panic!("one of the two refused {constraints:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn anchors_and_edits_are_refused_when_a_session_opens() {
+        let asked = Constraints {
+            anchors: vec![anchor_at(None)],
+            edits: vec![grab_at(None)],
+            ..Constraints::default()
+        };
+        let scan = scan_of(&holed_sheet(8, 0.15));
+        let error = ScanSession::open(scan, &asked, Arc::clone(mender()), Cancellation::NEVER);
+        let fields = error.err().expect("a refusal").fields();
+        let pointers: Vec<&str> = fields.iter().map(|f| f.pointer.as_str()).collect();
+        assert_eq!(pointers, ["/anchors", "/edits"]);
+    }
 }

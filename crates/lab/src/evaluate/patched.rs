@@ -8,6 +8,7 @@ use darn_geometry::mesh::region::{Region, grow};
 use darn_geometry::mesh::topology::Topology;
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
 use darn_geometry::patch::{self, Patch, PatchError, PatchOptions, signed_area};
+use darn_geometry::polygon::inside;
 
 use super::metrics::faces;
 
@@ -74,13 +75,4 @@ fn grid_chart(region: &Region) -> Chart {
         flipped: 0,
         rounds: 0,
     }
-}
-
-/// Whether a point lies in a polygon (even–odd rule).
-pub(super) fn inside(polygon: &[Vec2], p: Vec2) -> bool {
-    let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
-    let crossed = edges.filter(|(a, b)| {
-        (a.y <= p.y) != (b.y <= p.y) && a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x) > p.x
-    });
-    crossed.count() % 2 == 1
 }

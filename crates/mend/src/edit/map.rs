@@ -1,8 +1,8 @@
-//! The map of an anchor search as a picture: how far the cloth would stay from the target, cell by cell, with the way the search took.
+//! The map of an anchor search as a picture: for each cell how far the cloth stays from the target, and the path of the search.
 
 use image::{ImageFormat, Rgb, RgbImage};
 
-use super::search::{Slope, Step};
+use super::search::{CellLoss, PathCell};
 use darn_geometry::grid::SIDE;
 use darn_geometry::mesh::Vec2;
 
@@ -12,9 +12,9 @@ const CELL: i32 = 8;
 const MARGIN: i32 = 16;
 const LEGEND: i32 = 72;
 const BAR: i32 = 14;
-/// A stroke along the slope stands in every such cell, both ways.
+/// Of this many columns, and of as many rows, one has strokes along the gradient.
 const EVERY: usize = 3;
-/// Viridis (van der Walt & Smith), seven stops from near to far.
+/// Seven colours of Viridis (van der Walt & Smith), from near to far.
 const STOPS: [[u8; 3]; 7] = [
     [253, 231, 37],
     [144, 215, 67],
@@ -27,7 +27,7 @@ const STOPS: [[u8; 3]; 7] = [
 const PAPER: Rgb<u8> = Rgb([250, 250, 248]);
 const CLOTH: Rgb<u8> = Rgb([222, 224, 228]);
 const INK: Rgb<u8> = Rgb([30, 30, 34]);
-const WAY: Rgb<u8> = Rgb([255, 255, 255]);
+const PATH: Rgb<u8> = Rgb([255, 255, 255]);
 const END: Rgb<u8> = Rgb([214, 48, 49]);
 /// Digits of three by five dots, a row in three bits, the upper row first.
 const DIGITS: [[u8; 5]; 10] = [
@@ -45,22 +45,29 @@ const DIGITS: [[u8; 5]; 10] = [
 /// Pixels of a dot.
 const DOT: i32 = 2;
 
-/// Draws the map: `slopes[cell]` for each of the 64 × 64 cells, `None` outside the hole; the path on top, a disk at its end.
+/// Distances of the cloth from the target, in cells.
+#[derive(Clone, Copy)]
+struct DistanceRange {
+    low: f64,
+    high: f64,
+}
+
+/// Draws the map: `losses[cell]` for each of the 64 × 64 cells, `None` outside the hole; the path on top, with a disk at its end.
 ///
-/// Colours stand for the distance in cells (the root of the loss), bright near, from the least to the largest; the legend names both ends
-/// and the middle. Short strokes point downhill. u runs right, v up.
-pub fn picture(slopes: &[Option<Slope>], path: &[Step]) -> RgbImage {
+/// A colour is the distance in cells (the root of the loss), bright where it is small, from the least to the largest; the legend names both
+/// ends and the middle. Short strokes point downhill. u runs right, v up.
+pub fn picture(losses: &[Option<CellLoss>], path: &[PathCell]) -> RgbImage {
     let side = SIDE as i32 * CELL;
     let size = [side + 2 * MARGIN + LEGEND, side + 2 * MARGIN].map(|s| s as u32);
     let mut image = RgbImage::from_pixel(size[0], size[1], PAPER);
-    let far = |s: &Slope| s.loss.max(0.0).sqrt();
-    let seen = (slopes.iter().flatten().map(far)).filter(|d| d.is_finite());
+    let far = |at: &CellLoss| at.loss.max(0.0).sqrt();
+    let seen = (losses.iter().flatten().map(far)).filter(|d| d.is_finite());
     let (low, high) = seen.fold((f64::INFINITY, 0.0f64), |(l, h), d| (l.min(d), h.max(d)));
     let low = low.min(high);
     let share = |d: f64| (d - low) / (high - low).max(f64::MIN_POSITIVE);
 
-    for (cell, slope) in slopes.iter().enumerate().take(SIDE * SIDE) {
-        let colour = slope.map_or(CLOTH, |s| ramp(share(far(&s))));
+    for (cell, loss) in losses.iter().enumerate().take(SIDE * SIDE) {
+        let colour = loss.map_or(CLOTH, |at| ramp(share(far(&at))));
         let corner = middle(cell) - Vec2::repeat(f64::from(CELL) / 2.0);
         fill(
             &mut image,
@@ -69,40 +76,36 @@ pub fn picture(slopes: &[Option<Slope>], path: &[Step]) -> RgbImage {
             colour,
         );
     }
-    for (cell, slope) in slopes.iter().enumerate().take(SIDE * SIDE) {
+    for (cell, loss) in losses.iter().enumerate().take(SIDE * SIDE) {
         let marked = cell % SIDE % EVERY == 1 && cell / SIDE % EVERY == 1;
-        if let (true, Some(slope)) = (marked, slope)
-            && let Some(down) = (-slope.gradient).try_normalize(1e-12)
+        if let (true, Some(loss)) = (marked, loss)
+            && let Some(down) = (-loss.gradient).try_normalize(1e-12)
         {
             let to = Vec2::new(down.x, -down.y) * f64::from(CELL) * 1.1;
-            line(&mut image, [middle(cell), middle(cell) + to], 0, INK);
+            line(&mut image, middle(cell), middle(cell) + to, 0, INK);
         }
     }
-    for (thickness, colour) in [(2, INK), (1, WAY)] {
+    for (thickness, colour) in [(2, INK), (1, PATH)] {
         for pair in path.windows(2) {
-            line(
-                &mut image,
-                [middle(pair[0].cell), middle(pair[1].cell)],
-                thickness,
-                colour,
-            );
+            let (from, to) = (middle(pair[0].cell), middle(pair[1].cell));
+            line(&mut image, from, to, thickness, colour);
         }
     }
     for step in path {
-        dot(&mut image, middle(step.cell), 2, WAY);
+        dot(&mut image, middle(step.cell), 2, PATH);
     }
     if let Some(end) = path.last() {
         dot(&mut image, middle(end.cell), 5, INK);
         dot(&mut image, middle(end.cell), 4, END);
     }
-    legend(&mut image, (low, high));
+    legend(&mut image, DistanceRange { low, high });
     image
 }
 
-/// The same as PNG bytes.
+/// An image as PNG bytes.
 ///
 /// # Errors
-/// What the encoder says; it has no reason to.
+/// Whatever the encoder fails with.
 pub fn png(image: &RgbImage) -> Result<Vec<u8>, image::ImageError> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     image.write_to(&mut bytes, ImageFormat::Png)?;
@@ -110,7 +113,8 @@ pub fn png(image: &RgbImage) -> Result<Vec<u8>, image::ImageError> {
 }
 
 /// The bar of colours, near at the bottom, with the distances at its ends and middle.
-fn legend(image: &mut RgbImage, (low, high): (f64, f64)) {
+fn legend(image: &mut RgbImage, distances: DistanceRange) {
+    let DistanceRange { low, high } = distances;
     let side = SIDE as i32 * CELL;
     let left = side + 2 * MARGIN;
     for row in 0..side {
@@ -170,11 +174,11 @@ fn dot(image: &mut RgbImage, at: Vec2, radius: i32, colour: Rgb<u8>) {
     }
 }
 
-fn line(image: &mut RgbImage, ends: [Vec2; 2], radius: i32, colour: Rgb<u8>) {
-    let way = ends[1] - ends[0];
+fn line(image: &mut RgbImage, from: Vec2, to: Vec2, radius: i32, colour: Rgb<u8>) {
+    let way = to - from;
     let steps = way.amax().ceil().max(1.0) as i32;
     for k in 0..=steps {
-        let at = ends[0] + way * (f64::from(k) / f64::from(steps));
+        let at = from + way * (f64::from(k) / f64::from(steps));
         dot(image, at, radius, colour);
     }
 }
@@ -204,17 +208,17 @@ mod tests {
     use darn_geometry::grid::{CELLS, cell_index};
 
     #[test]
-    fn near_cells_are_bright_and_cells_outside_the_hole_are_cloth() {
-        let slope = |loss| {
-            Some(Slope {
+    fn near_cells_are_bright_and_cells_outside_the_hole_are_grey() {
+        let cell_loss = |loss| {
+            Some(CellLoss {
                 loss,
                 gradient: Vec2::zeros(),
             })
         };
-        let mut slopes = vec![None; CELLS];
-        slopes[cell_index(30, 30)] = slope(0.0);
-        slopes[cell_index(31, 30)] = slope(100.0);
-        let image = picture(&slopes, &[]);
+        let mut losses = vec![None; CELLS];
+        losses[cell_index(30, 30)] = cell_loss(0.0);
+        losses[cell_index(31, 30)] = cell_loss(100.0);
+        let image = picture(&losses, &[]);
         let pixel = |cell| {
             let at = middle(cell);
             *image.get_pixel(at.x as u32, at.y as u32)
@@ -226,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn a_map_of_nothing_is_drawn_all_the_same() {
+    fn a_hole_without_cells_gives_a_map_of_the_same_size() {
         let image = picture(&vec![None; CELLS], &[]);
         assert_eq!(image.height(), 544);
     }

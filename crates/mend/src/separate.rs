@@ -1,25 +1,26 @@
-//! Patches of one scan that come near each other: each hole is filled without knowing of the others.
+//! Pushes the patches of one scan apart where they come near each other: each hole is filled without regard to the others.
 
 use std::collections::HashSet;
 
-use super::hole::Filled;
+use crate::fill_hole::PatchDraft;
 use darn_geometry::mesh::{TriMesh, Vec3};
 
-/// Pushes every patch off those before it, where their boxes meet; in order of id, so that the outcome does not depend on threads.
-pub fn apart(holes: &mut [Filled]) {
-    for own in 1..holes.len() {
-        let (before, rest) = holes.split_at_mut(own);
+/// Pushes every patch away from those before it where their boxes meet. The drafts are in order of id, so that the result does not depend on
+/// threads.
+pub fn separate(drafts: &mut [PatchDraft]) {
+    for own in 1..drafts.len() {
+        let (before, rest) = drafts.split_at_mut(own);
         let own = &mut rest[0];
         let others = near(own, before);
         if !others.faces.is_empty() {
-            own.prepared.plan.separate(&mut own.patch, &others);
+            own.hole.plan.keep_off(&mut own.patch, &others);
         }
     }
 }
 
-/// The triangles of other patches whose box meets that of a patch. One that has a vertex of the patch's rim touches it there and does not
-/// count.
-fn near(own: &Filled, others: &[Filled]) -> TriMesh {
+/// The triangles of other patches whose box meets the box of a patch. Triangles with a vertex on the patch's own rim touch it there and are
+/// left out.
+fn near(own: &PatchDraft, others: &[PatchDraft]) -> TriMesh {
     let (low, high) = bounds(&own.patch.positions);
     let on_rim: HashSet<u32> = rim(own).collect();
     let mut near = TriMesh::default();
@@ -42,16 +43,13 @@ fn near(own: &Filled, others: &[Filled]) -> TriMesh {
     near
 }
 
-/// The rim's vertices in the whole scan's numbering.
-fn rim<'a>(filled: &'a Filled) -> impl Iterator<Item = u32> + 'a {
-    let region = &filled.prepared.region;
-    filled
-        .patch
-        .rim
-        .iter()
-        .map(|v| region.vertices[*v as usize].0)
+/// The rim's vertices as vertices of the welded scan.
+fn rim<'a>(draft: &'a PatchDraft) -> impl Iterator<Item = u32> + 'a {
+    let region = &draft.hole.region;
+    draft.patch.rim.iter().map(|v| region.vertices[*v as usize])
 }
 
+/// The least and the largest coordinates.
 fn bounds(positions: &[Vec3]) -> (Vec3, Vec3) {
     let low = positions
         .iter()

@@ -1,8 +1,8 @@
-//! A scan seen as cloth: welded, with its boundary loops, and how its triangles lead back to the scan's own.
+//! A scan with its triangles welded and its boundary loops found; each welded triangle leads back to one of the scan's.
 
 use std::time::Instant;
 
-use super::milliseconds;
+use crate::timings::milliseconds;
 use darn_contract::v1;
 use darn_geometry::mesh::index::{FaceId, VertexId};
 use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind, boundary_loops};
@@ -11,63 +11,72 @@ use darn_geometry::mesh::weld::{WeldedMesh, weld};
 use darn_gltf_scan::Scan;
 
 /// The welded surface of a scan and its loops.
-pub struct Cloth {
-    /// Welded mesh; its faces lead back to the scan's by `soup_face`.
-    pub welded: WeldedMesh,
+pub struct WeldedScan {
+    /// The welded mesh; `face_of` leads from its faces back to the scan's.
+    pub surface: Welded,
     /// Its topology.
     pub topology: Topology,
-    /// Its boundary loops; a loop's id is its place here.
+    /// Its boundary loops; a loop's id is its index here.
     pub loops: Vec<BoundaryLoop>,
-    /// Milliseconds of welding and of finding loops.
+    /// Milliseconds of welding and of finding the loops.
     pub timings: v1::ScanTimings,
 }
 
-impl Cloth {
+/// A face of a scan.
+#[derive(Debug, Clone, Copy)]
+pub struct SourceFace {
+    /// Index of the scan's part that it belongs to.
+    pub part: usize,
+    /// Its corners, as vertices of the scan.
+    pub corners: [u32; 3],
+}
+
+impl WeldedScan {
     /// Welds a scan and finds its loops.
-    pub fn of(scan: &Scan) -> Cloth {
+    pub fn of(scan: &Scan) -> WeldedScan {
         let started = Instant::now();
-        let welded = weld(&scan.surface);
+        let surface = weld(&scan.surface);
         let weld = milliseconds(started);
         let started = Instant::now();
-        let topology = welded.topology();
-        let loops = boundary_loops(&welded.mesh, &topology);
+        let topology = surface.topology();
+        let loops = boundary_loops(&surface.mesh, &topology);
         let timings = v1::ScanTimings {
             weld,
             loops: milliseconds(started),
             ..Default::default()
         };
-        Cloth {
-            welded,
+        WeldedScan {
+            surface,
             topology,
             loops,
             timings,
         }
     }
 
-    /// Bytes of memory it holds, about.
+    /// Bytes of memory that it holds, estimated.
     pub fn bytes(&self) -> usize {
-        let mesh = &self.welded.mesh;
+        let mesh = &self.surface.mesh;
         let loops: usize = self.loops.iter().map(|l| 8 * l.vertices.len()).sum();
-        // A position and the topology's entry for a vertex; corners, twins and origin for a face.
+        // For a vertex its position and the topology's entry; for a face its corners, twins and origin.
         (24 + 8) * mesh.positions.len() + (12 + 16 + 4) * mesh.faces.len() + loops
     }
 
-    /// The scan's part that a welded face belongs to, and its corners there.
-    pub fn source(&self, scan: &Scan, face: FaceId) -> Option<(usize, [u32; 3])> {
-        let own = *self.welded.soup_face.get(face.index())?;
-        Some((
-            scan.part_of_face(own)?,
-            *scan.surface.faces.get(own as usize)?,
-        ))
+    /// The scan's face that a welded face was made of.
+    pub fn source(&self, scan: &Scan, face: u32) -> Option<SourceFace> {
+        let own = *self.surface.face_of.get(face as usize)?;
+        Some(SourceFace {
+            part: scan.part_of_face(own)?,
+            corners: *scan.surface.faces.get(own as usize)?,
+        })
     }
 
-    /// A loop as the API describes it.
-    pub fn described(&self, rim: &BoundaryLoop, scan: &Scan) -> v1::Loop {
+    /// A loop in the contract's words.
+    pub fn loop_report(&self, rim: &BoundaryLoop, scan: &Scan) -> v1::Loop {
         let part = rim
             .half_edges
             .first()
-            .and_then(|h| self.source(scan, h.face()))
-            .map(|(part, _)| part);
+            .and_then(|h| self.source(scan, h / 3))
+            .map(|source| source.part);
         v1::Loop {
             id: rim.id.0,
             kind: kind(rim.kind) as i32,
@@ -84,20 +93,20 @@ impl Cloth {
         }
     }
 
-    /// Whether the meshes a loop lies on are drawn here for the first time, all along it: a patch on a mesh shows at every node that
-    /// draws it.
+    /// Whether every mesh that a loop lies on is drawn here by the first of its nodes. A patch on a mesh shows at every node that draws the
+    /// mesh.
     pub fn on_first_instance(&self, scan: &Scan, rim: &BoundaryLoop) -> bool {
-        let mut parts = rim.half_edges.iter().map(|h| self.source(scan, h.face()));
-        parts.all(|part| part.is_none_or(|(part, _)| scan.parts[part].first_instance))
+        let mut sources = rim.half_edges.iter().map(|h| self.source(scan, h / 3));
+        sources.all(|s| s.is_none_or(|s| scan.parts[s.part].first_instance))
     }
 
     /// What a person should know about the scan as a whole.
     pub fn notes(&self, scan: &Scan) -> Vec<String> {
         let mut notes = Vec::new();
-        if self.welded.dropped > 0 {
+        if self.surface.dropped > 0 {
             notes.push(format!(
                 "{} degenerate or duplicate triangle(s) were not looked at",
-                self.welded.dropped
+                self.surface.dropped
             ));
         }
         if !self.topology.non_manifold.is_empty() {
@@ -128,9 +137,9 @@ impl Cloth {
         notes
     }
 
-    /// Places where boundary loops touch in a point (bow-ties).
+    /// Number of points in which boundary loops touch (bow-ties).
     fn touching(&self) -> usize {
-        let place = |v: &VertexId| self.welded.mesh.positions[v.index()];
+        let place = |v: &u32| self.surface.mesh.positions[*v as usize];
         let ends = self.loops.iter().flat_map(|l| &l.vertices).map(place);
         let mut places: Vec<[u64; 3]> = ends.map(|p| [p.x, p.y, p.z].map(f64::to_bits)).collect();
         places.sort_unstable();

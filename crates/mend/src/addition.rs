@@ -1,13 +1,12 @@
-//! A patch in the scan's own terms: which mesh takes it, which vertices it shares, its attributes and its provenance.
+//! A patch in the scan's terms: the mesh that takes it, the vertices it shares, its attributes and its provenance.
 
 use std::collections::BTreeMap;
 
 use serde_json::json;
 
-use super::cloth::Cloth;
-use super::hole::Made;
-use super::prepared::Prepared;
-use super::{MendError, VERSION};
+use crate::VERSION;
+use crate::hole_report::FilledHole;
+use crate::welded_scan::{SourceFace, WeldedScan};
 use darn_contract::v1;
 use darn_geometry::mesh::Vec3;
 use darn_geometry::mesh::curvature::vertex_normals;
@@ -17,19 +16,21 @@ use darn_geometry::patch::{Patch, quality};
 use darn_gltf_scan::{PatchPoint, PatchPrimitive, Scan, ScanPart};
 use darn_net::WeightsCard;
 
-/// The patch as a primitive of the part that most of its rim belongs to.
+/// The patch of a filled hole as a primitive of the part that most of its rim belongs to; `card` is that of the network that filled it.
 pub fn addition(
-    (scan, cloth): (&Scan, &Cloth),
-    prepared: &Prepared,
-    Made { patch, report }: &Made,
+    scan: &Scan,
+    welded: &WeldedScan,
+    filled: &FilledHole,
     card: &WeightsCard,
-) -> Result<PatchPrimitive, MendError> {
-    let (region, chart) = (&prepared.region, &prepared.chart);
-    let sources: Vec<Option<(usize, [u32; 3])>> = region
-        .faces
-        .iter()
-        .map(|f| cloth.source(scan, *f))
-        .collect();
+) -> PatchPrimitive {
+    let FilledHole {
+        hole,
+        patch,
+        report,
+    } = filled;
+    let (region, chart) = (&hole.region, &hole.chart);
+    let faces = region.faces.iter();
+    let sources: Vec<Option<SourceFace>> = faces.map(|f| welded.source(scan, *f)).collect();
     let part = majority(patch, region, &sources);
     let look = &scan.parts[part];
     let alike = |other: usize| {
@@ -40,26 +41,26 @@ pub fn addition(
     };
     let corners: Vec<Option<[u32; 3]>> = sources
         .iter()
-        .map(|s| s.filter(|(p, _)| alike(*p)).map(|(_, c)| c))
+        .map(|s| s.filter(|s| alike(s.part)).map(|s| s.corners))
         .collect();
     let mut any = vec![u32::MAX; region.mesh.positions.len()];
     let mut owners: Vec<(u32, usize)> = Vec::new();
     for (face, source) in region.mesh.faces.iter().zip(&sources) {
-        let Some((p, scan_corners)) = source else {
+        let Some(source) = source else {
             continue;
         };
-        if alike(*p) {
-            owners.extend(scan_corners.map(|s| (s, *p)));
+        if alike(source.part) {
+            owners.extend(source.corners.map(|s| (s, source.part)));
         }
-        for (v, s) in face.iter().zip(scan_corners) {
+        for (v, s) in face.iter().zip(&source.corners) {
             // A vertex of the patch's own node is preferred: its stored bits are copied.
-            let own = scan.parts[*p].node == look.node;
+            let own = scan.parts[source.part].node == look.node;
             if own || any[*v as usize] == u32::MAX {
                 any[*v as usize] = *s;
             }
         }
     }
-    // Parts may share vertices; the last to use one is asked.
+    // Parts may share vertices; the last part that uses a vertex gives its values.
     owners.sort_by_key(|(s, _)| *s);
     let values = |s: u32| {
         let after = owners.partition_point(|(vertex, _)| *vertex <= s);
@@ -74,7 +75,7 @@ pub fn addition(
         width,
     };
     let (dressed, normals) = rayon::join(
-        || extend_attributes(&prepared.plan, patch, region, chart, &columns),
+        || extend_attributes(&hole.plan, patch, region, chart, &columns),
         || normals(patch, region),
     );
     let points = dressed.corners.iter().map(|c| match c.scan {
@@ -105,12 +106,12 @@ pub fn addition(
             .map(|n| [0, 1, 2, 3].map(|k: usize| rgba[k][n]))
             .collect()
     });
-    Ok(PatchPrimitive {
+    PatchPrimitive {
         part,
         material_of: part,
         points: points.collect(),
         faces: dressed.faces,
-        both_sides: is_backed(region, cloth),
+        both_sides: is_backed(region, welded),
         normals: dressed
             .corners
             .iter()
@@ -120,25 +121,27 @@ pub fn addition(
         colors: colors.collect(),
         name: format!("darn reconstruction of hole {}", report.id),
         extras: provenance(report, card),
-    })
+    }
 }
 
-/// Whether most of a region shows its other side by triangles of its own.
-fn is_backed(region: &Region, cloth: &Cloth) -> bool {
+/// Whether most triangles of a region have a twin that shows their other side.
+fn is_backed(region: &Region, welded: &WeldedScan) -> bool {
     let backed = region.faces.iter();
-    let backed = backed.filter(|f| cloth.welded.two_sided[f.index()]).count();
+    let backed = backed
+        .filter(|f| welded.surface.backed[**f as usize])
+        .count();
     2 * backed > region.faces.len()
 }
 
-/// The part that the largest number of rim edges belongs to; the first of them on a tie.
-fn majority(patch: &Patch, region: &Region, sources: &[Option<(usize, [u32; 3])>]) -> usize {
+/// The part that most rim edges belong to; the first one on a tie.
+fn majority(patch: &Patch, region: &Region, sources: &[Option<SourceFace>]) -> usize {
     let mut on_rim = vec![false; region.mesh.positions.len()];
     patch.rim.iter().for_each(|v| on_rim[*v as usize] = true);
     let mut votes: BTreeMap<usize, usize> = BTreeMap::new();
     for (face, source) in region.mesh.faces.iter().zip(sources) {
         let touching = face.iter().filter(|v| on_rim[**v as usize]).count();
-        if let (2.., Some((part, _))) = (touching, source) {
-            *votes.entry(*part).or_default() += 1;
+        if let (2.., Some(source)) = (touching, source) {
+            *votes.entry(source.part).or_default() += 1;
         }
     }
     votes
@@ -147,7 +150,7 @@ fn majority(patch: &Patch, region: &Region, sources: &[Option<(usize, [u32; 3])>
         .map_or(0, |(part, _)| part)
 }
 
-/// Texture coordinates, then colours, of a scan vertex.
+/// The values of a scan vertex: its texture coordinates, then its colours.
 fn columns_of(part: &ScanPart, vertex: u32) -> Vec<f64> {
     let at = (vertex - part.vertices.start) as usize;
     let texcoords = part.texcoords.iter().flat_map(|set| set[at]);
@@ -155,7 +158,7 @@ fn columns_of(part: &ScanPart, vertex: u32) -> Vec<f64> {
     texcoords.chain(colors).map(f64::from).collect()
 }
 
-/// Normals of the patch's vertices with the scan's triangles around taken into account, so that the light does not break at the seam.
+/// Normals of the patch's vertices. The scan's triangles around the patch count, too, so that the shading is continuous at the seam.
 fn normals(patch: &Patch, region: &Region) -> Vec<Vec3> {
     let all = vertex_normals(&quality::joined(patch, region));
     let inner = region.mesh.positions.len();
@@ -164,7 +167,8 @@ fn normals(patch: &Patch, region: &Region) -> Vec<Vec3> {
     rim.chain(all[inner..].iter().copied()).map(solid).collect()
 }
 
-/// What `extras.darn` says of a patch: that it is reconstructed, by what, and with which numbers. No timings: same input, same bytes.
+/// `extras.darn` of a patch: that it is reconstructed, by which version and weights, and its numbers. No timings, as the same input gives the
+/// same bytes.
 fn provenance(report: &v1::HoleReport, card: &WeightsCard) -> serde_json::Value {
     let patch = report.patch.clone().unwrap_or_default();
     let chart = report.chart.unwrap_or_default();

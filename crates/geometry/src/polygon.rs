@@ -1,0 +1,37 @@
+//! Polygons in the plane, given by their corners in order.
+
+use crate::mesh::Vec2;
+
+/// Whether a point lies in a polygon (even–odd rule).
+pub fn inside(polygon: &[Vec2], p: Vec2) -> bool {
+    let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
+    let crossed = edges.filter(|(a, b)| {
+        (a.y <= p.y) != (b.y <= p.y) && a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x) > p.x
+    });
+    crossed.count() % 2 == 1
+}
+
+/// Larger side of a polygon's box; `-∞` for a polygon without corners.
+pub fn extent(polygon: &[Vec2]) -> f64 {
+    let low = polygon.iter().fold(Vec2::repeat(f64::MAX), |m, p| m.inf(p));
+    let high = polygon.iter().fold(Vec2::repeat(f64::MIN), |m, p| m.sup(p));
+    (high - low).max()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_point_of_a_box_with_a_notch_is_inside_unless_it_lies_in_the_notch(x in -1.0..4.0f64, y in -1.0..3.0f64) {
+            let corners = [[0.0, 0.0], [3.0, 0.0], [3.0, 2.0], [2.0, 2.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
+            let polygon = corners.map(Vec2::from);
+            let in_box = (0.0..3.0).contains(&x) && (0.0..2.0).contains(&y);
+            let in_notch = (1.0..2.0).contains(&x) && y >= 1.0;
+            prop_assert_eq!(inside(&polygon, Vec2::new(x, y)), in_box && !in_notch);
+            prop_assert_eq!(extent(&polygon), 3.0);
+        }
+    }
+}

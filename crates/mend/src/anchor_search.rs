@@ -1,0 +1,189 @@
+//! The anchor search on a hole: the network's loss at each cell, the start, and the answer in the contract's words.
+
+use std::time::Instant;
+
+use crate::context::HoleContext;
+use crate::edit::{
+    CellLoss, LossField, PathCell, SearchOutcome, descend, map, nearest_cell, search_every_cell,
+    seeds,
+};
+use crate::error::MendError;
+use crate::inpainter::Inpainter;
+use crate::mender::check_cancelled;
+use crate::timings::milliseconds;
+use darn_contract::port::Cancellation;
+use darn_contract::{FieldError, Search, v1};
+use darn_geometry::grid::{CELLS, SIDE, cell_centre};
+use darn_geometry::mesh::{Vec2, Vec3};
+use darn_net::{AnchorLoss, AnchorProblem};
+
+/// Targets farther from the hole than this many of its extents are moved to that distance along the same line: the network computes in f32.
+const FAR: f64 = 100.0;
+
+/// The network's loss of an anchor at a target, for each cell.
+struct AnchorLosses<'a> {
+    inpainter: &'a Inpainter<'a>,
+    problem: AnchorProblem,
+    /// How far the target was moved towards the hole, scene units.
+    moved_in: f64,
+    cancellation: Cancellation<'a>,
+}
+
+impl<'a> AnchorLosses<'a> {
+    fn new(
+        context: &'a HoleContext<'a>,
+        target: Vec3,
+        cancellation: Cancellation<'a>,
+    ) -> Result<AnchorLosses<'a>, MendError> {
+        let hole = context.hole;
+        let centre = hole.normal.centre;
+        let near = centre + (target - centre).cap_magnitude(FAR * hole.extent());
+        let target_at = hole.normal.to_network(&near);
+        let inpainter = &context.inpainter;
+        Ok(AnchorLosses {
+            moved_in: (target - near).norm(),
+            problem: inpainter.anchor_problem(&hole.normal_grid(), target_at)?,
+            inpainter,
+            cancellation,
+        })
+    }
+}
+
+impl LossField for AnchorLosses<'_> {
+    type Error = MendError;
+
+    fn losses(&self, cells: &[usize]) -> Result<Vec<f64>, MendError> {
+        check_cancelled(self.cancellation)?;
+        let losses = self.inpainter.losses(&self.problem, &uvs(cells))?;
+        Ok(losses.into_iter().map(f64::from).collect())
+    }
+
+    fn gradients(&self, cells: &[usize]) -> Result<Vec<CellLoss>, MendError> {
+        check_cancelled(self.cancellation)?;
+        let losses = self.inpainter.gradients(&self.problem, &uvs(cells))?;
+        let cell_loss = |at: AnchorLoss| CellLoss {
+            loss: at.loss.into(),
+            gradient: Vec2::new(at.gradient[0].into(), at.gradient[1].into()),
+        };
+        Ok(losses.into_iter().map(cell_loss).collect())
+    }
+}
+
+fn uvs(cells: &[usize]) -> Vec<[f32; 2]> {
+    let uv = |k: &usize| cell_centre(*k).cast::<f32>().into();
+    cells.iter().map(uv).collect()
+}
+
+impl HoleContext<'_> {
+    /// The uv at which an anchor brings the cloth nearest to a position in scene space.
+    ///
+    /// # Errors
+    /// `NoCells` when no cell lies in the hole; a failure of the network.
+    pub fn place_anchor(&self, position: Vec3) -> Result<Vec2, MendError> {
+        let losses = AnchorLosses::new(self, position, Cancellation::NEVER)?;
+        let first = (self.cell_near(position)).ok_or_else(|| self.no_cells())?;
+        Ok(cell_centre(self.descend(&losses, first)?.cell))
+    }
+
+    /// Searches as asked, and reports the place and the path of the search.
+    ///
+    /// # Errors
+    /// At `/start` when that does not lie in the hole; `NoCells` when no cell does; a failure of the network; `Abandoned`.
+    pub fn search(
+        &self,
+        search: &Search,
+        cancellation: Cancellation,
+    ) -> Result<v1::AnchorFound, MendError> {
+        let started = Instant::now();
+        let hole = self.hole;
+        let target = Vec3::from(search.target);
+        let losses = AnchorLosses::new(self, target, cancellation)?;
+        let first = match search.start {
+            None => self.cell_near(target),
+            Some(uv) if hole.contains(uv.into()) => nearest_cell(&hole.cells, uv.into()),
+            Some([u, v]) => {
+                let detail = format!("[{u}, {v}] does not lie in the hole");
+                let wrong = FieldError::new("/start", detail);
+                return Err(MendError::Constraints(vec![wrong]));
+            }
+        };
+        let first = first.ok_or_else(|| self.no_cells())?;
+        let outcome = if search.exhaustive {
+            let outcome = search_every_cell(&losses, &hole.cells, &self.limits.search)?;
+            outcome.ok_or_else(|| self.no_cells())?
+        } else {
+            self.descend(&losses, first)?
+        };
+        let mut answer = self.answer(&outcome);
+        answer.distance += losses.moved_in;
+        if search.map {
+            self.add_map(&mut answer, &losses, &outcome.path)?;
+        }
+        answer.milliseconds = milliseconds(started);
+        Ok(answer)
+    }
+
+    fn no_cells(&self) -> MendError {
+        MendError::NoCells { hole: self.hole.id }
+    }
+
+    fn descend(&self, losses: &AnchorLosses, first: usize) -> Result<SearchOutcome, MendError> {
+        let cells = &self.hole.cells;
+        let seeds = seeds(cells, first, self.limits.seeds);
+        let outcome = descend(losses, cells, &seeds, &self.limits.search)?;
+        outcome.ok_or_else(|| self.no_cells())
+    }
+
+    /// The hole's cell whose unedited position is nearest to a target.
+    fn cell_near(&self, target: Vec3) -> Option<usize> {
+        let away = |k: &usize| (self.unedited.filled[*k] - target).norm_squared();
+        let each = self.hole.cells.indices().iter().copied();
+        each.min_by(|a, b| away(a).total_cmp(&away(b)).then(a.cmp(b)))
+    }
+
+    fn answer(&self, outcome: &SearchOutcome) -> v1::AnchorFound {
+        let column_and_row = |k: usize| vec![(k % SIDE) as u32, (k / SIDE) as u32];
+        let step = |step: &PathCell| v1::SearchStep {
+            cell: column_and_row(step.cell),
+            loss: step.at.loss,
+            gradient: step.at.gradient.iter().copied().collect(),
+        };
+        v1::AnchorFound {
+            hole: self.hole.id,
+            uv: cell_centre(outcome.cell).iter().copied().collect(),
+            cell: column_and_row(outcome.cell),
+            loss: outcome.loss,
+            distance: outcome.loss.max(0.0).sqrt() * self.hole.cell_width(),
+            path: outcome.path.iter().map(step).collect(),
+            evaluations: outcome.evaluations,
+            gradients: outcome.gradients,
+            ..Default::default()
+        }
+    }
+
+    /// Adds the map of the whole hole, which takes an evaluation with gradient of each of its cells.
+    fn add_map(
+        &self,
+        answer: &mut v1::AnchorFound,
+        losses: &AnchorLosses,
+        path: &[PathCell],
+    ) -> Result<(), MendError> {
+        let indices = self.hole.cells.indices();
+        let mut at_cells: Vec<Option<CellLoss>> = vec![None; CELLS];
+        for cells in indices.chunks(self.limits.search.batch.max(1)) {
+            for (cell, at) in cells.iter().zip(losses.gradients(cells)?) {
+                at_cells[*cell] = Some(at);
+            }
+        }
+        let count = indices.len() as u32;
+        answer.evaluations += count;
+        answer.gradients += count;
+        let loss = |at: &Option<CellLoss>| at.map_or(f64::NAN, |at| at.loss);
+        let gradient = |at: &Option<CellLoss>| at.map_or([f64::NAN; 2], |at| at.gradient.into());
+        answer.map = at_cells.iter().map(loss).collect();
+        answer.map_gradient = at_cells.iter().flat_map(gradient).collect();
+        let png = map::png(&map::picture(&at_cells, path)).map_err(MendError::Picture)?;
+        answer.map_png = png.into();
+        Ok(())
+    }
+}

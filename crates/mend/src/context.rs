@@ -1,0 +1,39 @@
+//! A hole with everything that filling it needs; `anchor_search`, `constraints`, `moved_fill` and `fill_hole` give it their methods.
+
+use std::sync::Arc;
+
+use crate::error::MendError;
+use crate::hole::{Hole, UneditedCloth};
+use crate::inpainter::Inpainter;
+use crate::limits::MendLimits;
+
+/// A hole, its cloth without constraints, and what fills it.
+pub struct HoleContext<'a> {
+    /// The hole.
+    pub hole: &'a Hole,
+    /// Its cloth without constraints.
+    pub unedited: Arc<UneditedCloth>,
+    /// The network.
+    pub inpainter: Inpainter<'a>,
+    /// The limits and options.
+    pub limits: &'a MendLimits,
+}
+
+impl<'a> HoleContext<'a> {
+    /// The context of a hole; fills the hole without constraints unless this inpainter did so before.
+    ///
+    /// # Errors
+    /// A failure of the network, or a hole that cannot be meshed.
+    pub fn new(
+        hole: &'a Hole,
+        inpainter: &Inpainter<'a>,
+        limits: &'a MendLimits,
+    ) -> Result<HoleContext<'a>, MendError> {
+        Ok(HoleContext {
+            hole,
+            unedited: hole.unedited(inpainter, limits)?,
+            inpainter: inpainter.clone(),
+            limits,
+        })
+    }
+}

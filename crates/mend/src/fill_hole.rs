@@ -1,0 +1,82 @@
+//! Fills one hole: the patch that a request's constraints and the network give it.
+
+use std::time::Instant;
+
+use crate::constraints::HoleConstraints;
+use crate::context::HoleContext;
+use crate::error::MendError;
+use crate::hole::Hole;
+use crate::select::HoleRequest;
+use crate::timings::milliseconds;
+use darn_contract::v1;
+use darn_geometry::mesh::Vec3;
+use darn_geometry::patch::{Patch, Pull, bearable, quality};
+
+/// How often a smaller share of the network's movement is tried before the pulls alone move the unedited cloth.
+const MAX_TRIES: usize = 2;
+
+/// A hole's patch before it is measured and reported.
+pub struct PatchDraft<'a> {
+    /// The hole.
+    pub hole: &'a Hole,
+    /// The triangles.
+    pub patch: Patch,
+    /// What the patch should keep to.
+    pub constraints: HoleConstraints<'a>,
+    /// Milliseconds so far.
+    pub timings: v1::HoleTimings,
+}
+
+impl<'a> HoleContext<'a> {
+    /// Fills the hole as a request asks.
+    ///
+    /// # Errors
+    /// Constraints that do not fit the hole, hard anchors out of reach, a hole that cannot be meshed; a failure of the network.
+    pub fn fill(&self, request: &HoleRequest) -> Result<PatchDraft<'a>, MendError> {
+        let (hole, unedited) = (self.hole, &self.unedited);
+        let constraints = self.constraints(request)?;
+        let mut timings = hole.timings;
+        timings.net += unedited.net_ms;
+        timings.patch += unedited.patch_ms;
+
+        let pulls = constraints.pulls();
+        let patch = if pulls.is_empty() {
+            unedited.patch.clone()
+        } else {
+            let started = Instant::now();
+            let moved = self.moved_fill(&constraints.moves())?;
+            timings.net += milliseconds(started);
+            let started = Instant::now();
+            let patch = self.constrained_patch(&moved, &pulls)?;
+            timings.patch += milliseconds(started);
+            patch
+        };
+        Ok(PatchDraft {
+            hole,
+            patch,
+            constraints,
+            timings,
+        })
+    }
+
+    /// The patch of moved cloth, with as much of the network's movement as the cloth bears: the network's answer to targets that lie far
+    /// away is itself stretched.
+    fn constrained_patch(&self, moved: &[Vec3], pulls: &[Pull]) -> Result<Patch, MendError> {
+        let (hole, unedited) = (self.hole, &self.unedited);
+        let stretch = |patch: &Patch| quality::measure(patch, &hole.region).stretch_max;
+        let usual = stretch(&unedited.patch);
+        let most = bearable(usual);
+        let mut share = 1.0;
+        for _ in 0..MAX_TRIES {
+            let each = unedited.filled.iter().zip(moved);
+            let filled: Vec<Vec3> = each.map(|(from, to)| from.lerp(to, share)).collect();
+            let patch = hole.patch(&filled, pulls, self.limits)?;
+            let found = stretch(&patch);
+            if found <= most {
+                return Ok(patch);
+            }
+            share *= (most - usual) / (found - usual);
+        }
+        hole.patch(&unedited.filled, pulls, self.limits)
+    }
+}

@@ -1,0 +1,166 @@
+//! Measures a hole's patch and writes its report.
+
+use std::time::Instant;
+
+use rstar::{PointDistance as _, RTree};
+
+use crate::error::MendError;
+use crate::fill_hole::PatchDraft;
+use crate::hole::Hole;
+use crate::timings::milliseconds;
+use crate::welded_scan::{WeldedScan, kind};
+use darn_contract::v1;
+use darn_geometry::mesh::loops::LoopKind;
+use darn_geometry::patch::Patch;
+use darn_geometry::patch::quality::{self, Quality};
+
+/// A note is written when an edge of chart or patch is stretched more than this.
+const SUSPICIOUS: f64 = 1.5;
+/// A loose piece lies in the hole when all of its border is nearer to the patch than this many edges of the hole's rim.
+const IN_THE_HOLE: f64 = 1.5;
+
+/// A hole's patch and its report.
+pub struct FilledHole<'a> {
+    /// The hole.
+    pub hole: &'a Hole,
+    /// The triangles.
+    pub patch: Patch,
+    /// The report.
+    pub report: v1::HoleReport,
+}
+
+impl<'a> PatchDraft<'a> {
+    /// Measures the patch and writes its report.
+    ///
+    /// # Errors
+    /// `OutOfReach` for hard anchors that it does not meet.
+    pub fn measured(self, welded: &WeldedScan) -> Result<FilledHole<'a>, MendError> {
+        let PatchDraft {
+            hole,
+            patch,
+            constraints,
+            mut timings,
+        } = self;
+        let kept = constraints.kept(&patch)?;
+
+        let started = Instant::now();
+        let quality = quality::measure(&patch, &hole.region);
+        timings.report = milliseconds(started);
+        let mut notes = notes(hole, &quality);
+        notes.extend(loose_pieces_note(hole, &patch, welded));
+        notes.extend(constraints.notes(&kept.anchors));
+        let rim = &welded.loops[hole.id as usize];
+        let report = v1::HoleReport {
+            id: hole.id,
+            kind: kind(rim.kind) as i32,
+            length: rim.length,
+            vertices: rim.vertices.len() as u32,
+            chart: Some(chart_report(hole)),
+            grid: Some(hole.report),
+            patch: Some(patch_report(&patch, &quality)),
+            timings: Some(timings),
+            notes,
+            anchors: kept.anchors,
+            edits: kept.edits,
+        };
+        Ok(FilledHole {
+            hole,
+            patch,
+            report,
+        })
+    }
+}
+
+fn chart_report(hole: &Hole) -> v1::ChartReport {
+    v1::ChartReport {
+        faces: hole.region.faces.len() as u32,
+        stretch_mean: hole.chart.stretch_mean,
+        stretch_max: hole.chart.stretch_max,
+        flips: hole.chart.flipped as u32,
+        iterations: hole.chart.rounds as u32,
+    }
+}
+
+fn patch_report(patch: &Patch, quality: &Quality) -> v1::PatchReport {
+    v1::PatchReport {
+        vertices: patch.positions.len() as u32,
+        faces: patch.faces.len() as u32,
+        area: quality.area,
+        stretch_mean: quality.stretch_mean,
+        stretch_max: quality.stretch_max,
+        gaussian_curvature: quality.gaussian_curvature,
+        seam_gap: quality.seam_gap,
+        self_intersections: quality.self_intersections as u32,
+        strain_iterations: patch.strain_rounds as u32,
+        refinement: match patch.collisions {
+            0 => "strain_limiting",
+            _ => "strain_limiting+collisions",
+        }
+        .to_owned(),
+    }
+}
+
+/// A note on loose pieces of the scan that lie where the patch is. The chart does not contain them, as they are not connected to the cloth
+/// around the hole.
+fn loose_pieces_note(hole: &Hole, patch: &Patch, welded: &WeldedScan) -> Option<String> {
+    let rim = &welded.loops[hole.id as usize];
+    let others =
+        (welded.loops.iter()).filter(|l| l.kind == LoopKind::Outer && l.component != rim.component);
+    let mut others = others.peekable();
+    others.peek()?;
+    let near = IN_THE_HOLE * rim.length / rim.vertices.len().max(1) as f64;
+    let tree = RTree::bulk_load(
+        patch
+            .positions
+            .iter()
+            .map(|p| <[f64; 3]>::from(*p))
+            .collect(),
+    );
+    let is_near = |v: &u32| {
+        let place = <[f64; 3]>::from(welded.surface.mesh.positions[*v as usize]);
+        let nearest = tree.nearest_neighbor(&place);
+        nearest.is_some_and(|p| p.distance_2(&place) <= near * near)
+    };
+    let inside = others.filter(|l| l.vertices.iter().all(is_near));
+    let pieces: Vec<String> = inside.map(|l| l.id.to_string()).collect();
+    (!pieces.is_empty()).then(|| {
+        format!(
+            "loose piece(s) of the scan lie in the hole (their borders: loop {}); they were kept, and the new cloth covers their place, too",
+            pieces.join(", ")
+        )
+    })
+}
+
+/// What a person should look at before trusting the patch.
+fn notes(hole: &Hole, quality: &Quality) -> Vec<String> {
+    let mut notes = Vec::new();
+    if hole.denoised {
+        notes.push(
+            "the scan is noisy: the cloth around the hole was seen without that noise, its rim was kept"
+                .into(),
+        );
+    }
+    if hole.chart.stretch_max > SUSPICIOUS {
+        notes.push(format!(
+            "the cloth around the hole does not lie flat well: an edge is stretched {:.2} times",
+            hole.chart.stretch_max
+        ));
+    }
+    if quality.stretch_max > SUSPICIOUS {
+        let most = quality.stretch_max;
+        notes.push(format!("an edge of the patch is stretched {most:.2} times"));
+    }
+    if quality.self_intersections > 0 {
+        notes.push(format!(
+            "the patch cuts itself or the cloth around it in {} pair(s) of triangles",
+            quality.self_intersections
+        ));
+    }
+    let others = hole.region.holes.len();
+    if others > 0 {
+        notes.push(format!(
+            "{others} other hole(s) lie in the region and were unknown to the network"
+        ));
+    }
+    notes
+}

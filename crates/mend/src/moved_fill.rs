@@ -1,0 +1,55 @@
+//! The network's answer to a hole whose cloth moves at some cells.
+
+use crate::context::HoleContext;
+use crate::edit::CellMove;
+use crate::error::MendError;
+use crate::limits::EditedFill;
+use darn_geometry::grid::NormalGrid;
+use darn_geometry::mesh::Vec3;
+use darn_net::Averaging;
+
+impl HoleContext<'_> {
+    /// Every cell's position, scene space, when some cells of the hole move away from the unedited cloth.
+    ///
+    /// The network is given a moved cell's new position, marked as known. That is a soft constraint: the network may stay away from it.
+    ///
+    /// # Errors
+    /// A failure of the network.
+    pub fn moved_fill(&self, moves: &[CellMove]) -> Result<Vec<Vec3>, MendError> {
+        let (hole, unedited) = (self.hole, &self.unedited);
+        if moves.is_empty() {
+            return Ok(unedited.filled.clone());
+        }
+        let without = hole.normal_grid();
+        // With this share of every move.
+        let given = |share: f64| -> NormalGrid {
+            let mut grid = without.clone();
+            for CellMove { cell, by } in moves {
+                let at = unedited.predicted[*cell] + by * share;
+                grid.positions[*cell] = hole.normal.to_network(&at);
+                grid.known[*cell] = 1.0;
+            }
+            grid
+        };
+        let predicted = match self.limits.edited_fill {
+            EditedFill::Plain => {
+                let answers = self.inpainter.fill(&[given(1.0)], Averaging::Flips)?;
+                hole.in_scene(answers.first().map_or(&[], Vec::as_slice))
+            }
+            EditedFill::Difference => {
+                let grids = [given(1.0), given(0.0)];
+                let answers = self.inpainter.fill(&grids, Averaging::HalfTurn)?;
+                let mut answers = answers.iter().map(|a| hole.in_scene(a));
+                let (moved, unmoved) = (answers.next(), answers.next());
+                let each = unedited.predicted.iter();
+                match moved.zip(unmoved) {
+                    Some((moved, unmoved)) => (each.zip(moved.iter().zip(&unmoved)))
+                        .map(|(p, (moved, unmoved))| p + (moved - unmoved))
+                        .collect(),
+                    None => each.copied().collect(),
+                }
+            }
+        };
+        Ok(hole.filled(&predicted))
+    }
+}

@@ -1,0 +1,323 @@
+//! Prepares a hole: grows the region of cloth around it, lays the region flat, samples the grid and plans the patch.
+
+use std::cell::Cell;
+use std::time::Instant;
+
+use crate::edit::{HoleCells, ReachLimit, RimPoint};
+use crate::error::MendError;
+use crate::hole::{Hole, UneditedCloths};
+use crate::limits::MendLimits;
+use crate::timings::milliseconds;
+use crate::welded_scan::WeldedScan;
+use darn_contract::v1;
+use darn_geometry::flatten::{self, Chart};
+use darn_geometry::grid::{self, CELLS, Grid, Normalisation};
+use darn_geometry::mesh::denoise::denoised;
+use darn_geometry::mesh::layers::layers_near;
+use darn_geometry::mesh::region::{self, Region, RegionError};
+use darn_geometry::mesh::{TriMesh, Vec2};
+use darn_geometry::patch::{self, PatchError};
+use darn_geometry::polygon::{extent, inside};
+
+/// Share of the grid's side that the hole should take, so that hole and context share the grid as in training.
+const HOLE_SHARE: f64 = 0.5;
+/// A region is grown again when its reach differs from the suitable one by more than this factor.
+const REACH_TOLERANCE: f64 = 1.3;
+/// Factor of the reach of each further try, when a region gives no usable chart.
+const SHRINK: f64 = 0.6;
+/// Reach of the collar that the extent of a hole is first measured on, as a share of the reach that suits a round hole.
+const COLLAR: f64 = 0.2;
+/// Tries with smaller and smaller regions.
+const MAX_TRIES: usize = 4;
+
+/// Prepares the hole of a loop. Tries smaller and smaller regions when one gives no usable chart, and at last the cloth with the scanner's
+/// noise.
+///
+/// # Errors
+/// `Region`, `Flatten`, `TooLittleKnown` or `Patch`, whichever stage fails; of several tries the last one's, of the denoised cloth.
+pub fn prepare_hole(welded: &WeldedScan, id: u32, limits: &MendLimits) -> Result<Hole, MendError> {
+    let reach = reach_for(estimated_extent(welded, id));
+    without_noise(|denoise| {
+        let preparation = Preparation {
+            welded,
+            id,
+            limits,
+            denoise,
+        };
+        preparation.hole(reach)
+    })
+}
+
+/// Takes the scanner's noise off a mesh; `None` where it has none, or where the noise is to stay.
+type Denoise<'a> = &'a dyn Fn(&TriMesh) -> Option<TriMesh>;
+
+/// The result for the cloth without the scanner's noise; where that cannot be used, for the cloth as it was scanned.
+fn without_noise<T>(attempt: impl Fn(Denoise) -> Result<T, MendError>) -> Result<T, MendError> {
+    let noisy = Cell::new(false);
+    let denoise = |mesh: &TriMesh| {
+        let smooth = denoised(mesh);
+        noisy.set(noisy.get() || smooth.is_some());
+        smooth
+    };
+    match attempt(&denoise) {
+        Err(error) if noisy.get() && may_shrink(&error) => attempt(&|_| None).map_err(|_| error),
+        outcome => outcome,
+    }
+}
+
+/// A loop to prepare, and how.
+struct Preparation<'a> {
+    welded: &'a WeldedScan,
+    id: u32,
+    limits: &'a MendLimits,
+    denoise: Denoise<'a>,
+}
+
+/// The cloth around a hole, laid flat.
+struct FlatRegion {
+    region: Region,
+    /// The region without the scanner's noise, where there is some.
+    smooth: Option<Region>,
+    chart: Chart,
+    timings: v1::HoleTimings,
+}
+
+/// The grid of a hole and what is computed from it.
+struct SampledGrid {
+    grid: Grid,
+    normal: Normalisation,
+    cells: HoleCells,
+    base: Option<Vec<[f32; 3]>>,
+    milliseconds: f64,
+}
+
+impl Preparation<'_> {
+    /// The hole, with a region of this reach or a smaller one; the reach is in scene units.
+    fn hole(&self, mut reach: f64) -> Result<Hole, MendError> {
+        let mut tries = 0;
+        loop {
+            let outcome = self.flat_region(reach).and_then(|flat| self.sampled(flat));
+            tries += 1;
+            match outcome {
+                Err(error) if tries < MAX_TRIES && may_shrink(&error) => reach *= SHRINK,
+                outcome => return outcome,
+            }
+        }
+    }
+
+    /// Grows and flattens the region; once more when the chart shows that the reach did not suit the hole.
+    fn flat_region(&self, reach: f64) -> Result<FlatRegion, MendError> {
+        let flat = self.flattened(reach)?;
+        let suitable = reach_for(extent(&flat.rim_uv()) * flat.chart.frame.side);
+        // A larger region only if this one ended at its reach, and not because the cloth ended or wraps around.
+        let again = suitable < reach / REACH_TOLERANCE
+            || (suitable > reach * REACH_TOLERANCE && flat.region.reach >= reach);
+        if !again {
+            return Ok(flat);
+        }
+        let mut again = match self.flattened(suitable) {
+            Ok(again) => again,
+            Err(_) => return Ok(flat),
+        };
+        again.timings.region += flat.timings.region;
+        again.timings.flatten += flat.timings.flatten;
+        Ok(again)
+    }
+
+    /// Grows and flattens a region of this reach.
+    fn flattened(&self, reach: f64) -> Result<FlatRegion, MendError> {
+        let hole = self.id;
+        let started = Instant::now();
+        let region =
+            grown(self.welded, hole, reach).map_err(|source| MendError::Region { hole, source })?;
+        let grown_ms = milliseconds(started);
+        let started = Instant::now();
+        let smooth = (self.denoise)(&region.mesh).map(|mesh| Region {
+            mesh,
+            ..region.clone()
+        });
+        let seen = smooth.as_ref().unwrap_or(&region);
+        let chart = flatten::flatten(seen, &self.limits.flatten)
+            .map_err(|source| MendError::Flatten { hole, source })?;
+        let timings = v1::HoleTimings {
+            region: grown_ms,
+            flatten: milliseconds(started),
+            ..Default::default()
+        };
+        Ok(FlatRegion {
+            region,
+            smooth,
+            chart,
+            timings,
+        })
+    }
+
+    /// Samples the grid and plans the patch.
+    fn sampled(&self, flat: FlatRegion) -> Result<Hole, MendError> {
+        let (id, welded, limits) = (self.id, self.welded, self.limits);
+        let seen = flat.smooth.as_ref().unwrap_or(&flat.region);
+        let rim_uv = flat.rim_uv();
+        let sample = || {
+            let started = Instant::now();
+            let grid = flatten::raster(&seen.mesh, &flat.chart);
+            let normal = grid.normalisation().ok_or(MendError::TooLittleKnown {
+                hole: id,
+                known: grid.known_count(),
+            })?;
+            let cells = HoleCells::new(|k| !grid.known[k] && inside(&rim_uv, grid::cell_centre(k)));
+            let base = darn_net::plate(&grid.normalised(&normal).positions, &grid.known);
+            Ok::<_, MendError>(SampledGrid {
+                grid,
+                normal,
+                cells,
+                base,
+                milliseconds: milliseconds(started),
+            })
+        };
+        let plan = || {
+            let started = Instant::now();
+            let mesh = &welded.surface.mesh;
+            // The largest distance that cloth of the hole's extent can have from its rim.
+            let beyond = 0.5 * extent(&rim_uv) * flat.chart.frame.side;
+            let others = layers_near(mesh, &flat.region, beyond);
+            let plan = patch::plan_in(mesh, seen, &flat.chart, &limits.patch)
+                .and_then(|plan| match &flat.smooth {
+                    Some(_) => plan.joining(&flat.region.mesh.positions),
+                    None => Ok(plan),
+                })
+                .map_err(|source| MendError::Patch { hole: id, source })?;
+            Ok::<_, MendError>((plan.among(&others), milliseconds(started)))
+        };
+        let (sampled, planned) = rayon::join(sample, plan);
+        let sampled = sampled?;
+        let (plan, patch) = planned?;
+        let timings = v1::HoleTimings {
+            raster: sampled.milliseconds,
+            patch,
+            ..flat.timings
+        };
+        let denoised = flat.smooth.is_some();
+        let FlatRegion { region, chart, .. } = flat;
+        let rim = region.rim.iter().map(|v| RimPoint {
+            flat: chart.flat[*v as usize],
+            position: region.mesh.positions[*v as usize],
+        });
+        let reach = ReachLimit::new(rim);
+        Ok(Hole {
+            id,
+            plan,
+            report: grid_report(&sampled, &rim_uv),
+            grid: sampled.grid,
+            normal: sampled.normal,
+            cells: sampled.cells,
+            reach,
+            timings,
+            base: sampled.base,
+            denoised,
+            rim_uv,
+            unedited: UneditedCloths::default(),
+            region,
+            chart,
+        })
+    }
+}
+
+impl FlatRegion {
+    /// The rim on the chart's unit square.
+    fn rim_uv(&self) -> Vec<Vec2> {
+        let uv = |v: &u32| self.chart.uv(*v);
+        self.region.rim.iter().map(uv).collect()
+    }
+}
+
+fn grid_report(sampled: &SampledGrid, rim_uv: &[Vec2]) -> v1::GridReport {
+    let SampledGrid { grid, normal, .. } = sampled;
+    let spacing = grid::spacing(&grid.positions, |a, b| grid.known[a] && grid.known[b]);
+    v1::GridReport {
+        spacing_mean: normal.scale / grid::SIDE as f64,
+        spacing_variance: spacing.variance / (spacing.mean * spacing.mean),
+        known: grid.known_count() as f64 / CELLS as f64,
+        hole: patch::signed_area(rim_uv).abs(),
+    }
+}
+
+/// The region around a loop, of this reach in scene units.
+fn grown(welded: &WeldedScan, id: u32, reach: f64) -> Result<Region, RegionError> {
+    region::grow(
+        &welded.surface.mesh,
+        &welded.topology,
+        &welded.loops,
+        id as usize,
+        reach,
+    )
+}
+
+/// Reach of the region around a hole of this extent; both in scene units.
+fn reach_for(extent: f64) -> f64 {
+    0.5 * extent * (1.0 / HOLE_SHARE - 1.0)
+}
+
+/// Larger side of the hole's box in a chart of a narrow collar around it; where the collar cannot be laid flat, that of a round hole.
+fn estimated_extent(welded: &WeldedScan, id: u32) -> f64 {
+    let round = welded.loops[id as usize].length / std::f64::consts::PI;
+    let collar = grown(welded, id, COLLAR * reach_for(round));
+    match collar.map(|collar| flatten::hole_extent(&collar)) {
+        Ok(Ok(extent)) => extent,
+        _ => round,
+    }
+}
+
+/// Whether a smaller region may succeed after this error.
+fn may_shrink(error: &MendError) -> bool {
+    match error {
+        MendError::Flatten { .. } => true,
+        MendError::Patch { source, .. } => *source == PatchError::RimCrosses,
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use darn_geometry::mesh::Vec3;
+    use darn_geometry::mesh::shapes::{shaken, sheet};
+
+    #[test]
+    fn the_cloth_with_its_noise_is_tried_last() {
+        let clean = sheet(30, |_, _| true, |u, v| Vec3::new(u, v, 0.0));
+        let noisy = shaken(&clean, 0.3 / 30.0, 7);
+        let crosses = || MendError::Patch {
+            hole: 1,
+            source: PatchError::RimCrosses,
+        };
+        let tries = Cell::new(0);
+        // Fails where noise was taken off.
+        let fails_if_denoised = |scan: &TriMesh| {
+            tries.set(0);
+            without_noise(|denoise| {
+                tries.set(tries.get() + 1);
+                match denoise(scan) {
+                    None => Ok("as scanned"),
+                    Some(_) => Err(crosses()),
+                }
+            })
+        };
+        assert_eq!(fails_if_denoised(&clean).ok(), Some("as scanned"));
+        assert_eq!(tries.get(), 1);
+        assert_eq!(fails_if_denoised(&noisy).ok(), Some("as scanned"));
+        assert_eq!(tries.get(), 2);
+        let always_fails = |scan: &TriMesh, error: fn() -> MendError| {
+            tries.set(0);
+            without_noise(|denoise| -> Result<(), MendError> {
+                tries.set(tries.get() + 1);
+                denoise(scan);
+                Err(error())
+            })
+        };
+        assert!(always_fails(&noisy, crosses).is_err() && tries.get() == 2);
+        // A second try would not help cloth that has no noise, nor after another error.
+        assert!(always_fails(&clean, crosses).is_err() && tries.get() == 1);
+        let other = || MendError::NonManifold { hole: 1 };
+        assert!(always_fails(&noisy, other).is_err() && tries.get() == 1);
+    }
+}

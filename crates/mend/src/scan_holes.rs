@@ -1,0 +1,275 @@
+//! All holes of a scan that a request chose: prepared once, filled for this request and for later ones. A single call drops them, a session
+//! keeps them.
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use crate::VERSION;
+use crate::addition::addition;
+use crate::context::HoleContext;
+use crate::error::MendError;
+use crate::fill_hole::PatchDraft;
+use crate::hole::Hole;
+use crate::hole_report::FilledHole;
+use crate::inpainter::Inpainter;
+use crate::mender::{Call, NetworkMender, check_cancelled};
+use crate::prepare::prepare_hole;
+use crate::select::{HoleRequest, Selection};
+use crate::separate::separate;
+use crate::timings::milliseconds;
+use crate::welded_scan::WeldedScan;
+use darn_contract::port::Mended;
+use darn_contract::{Constraints, FieldError, HoleSelector, Search, v1};
+use darn_gltf_scan::{PatchPrimitive, Scan};
+
+/// A scan's holes, prepared.
+pub struct ScanHoles {
+    /// The scan's surface.
+    pub welded: WeldedScan,
+    /// The holes, in order of id.
+    pub holes: Vec<Hole>,
+    /// Milliseconds of preparing them.
+    pub prepare_ms: f64,
+    /// What the request selected.
+    selection: Selection,
+    /// The weights that the request names.
+    weights: Option<String>,
+    /// The up direction that the request gives.
+    up: Option<[f64; 3]>,
+}
+
+/// The holes of a scan, filled for one request.
+pub struct FilledScan<'a> {
+    /// The filled holes, in order of id.
+    pub holes: Vec<FilledHole<'a>>,
+    /// Every loop that was left.
+    pub skipped: Vec<v1::Skipped>,
+    /// What filled them.
+    pub inpainter: Inpainter<'a>,
+    /// Milliseconds of filling them, without preparing them.
+    pub fill_ms: f64,
+}
+
+impl ScanHoles {
+    /// Finds the holes that a request asks for and prepares them.
+    ///
+    /// # Errors
+    /// A constraint that does not fit the scan, no hole at all, too many holes, a hole that cannot be laid flat; `Abandoned`.
+    pub fn open(
+        scan: &Scan,
+        constraints: &Constraints,
+        call: Call,
+    ) -> Result<ScanHoles, MendError> {
+        let welded = WeldedScan::of(scan);
+        let selection = Selection::of(scan, &welded, constraints)?;
+        Self::prepare(welded, selection, constraints, call)
+    }
+
+    /// Prepares the one hole that a search is about.
+    ///
+    /// # Errors
+    /// As [`ScanHoles::open`], at `/hole`; and when the scan has several holes of which the search names none.
+    pub fn open_for_search(
+        scan: &Scan,
+        search: &Search,
+        call: Call,
+    ) -> Result<ScanHoles, MendError> {
+        let constraints = Constraints {
+            holes: search.hole.map(HoleSelector::Id).into_iter().collect(),
+            ..Constraints::default()
+        };
+        let welded = WeldedScan::of(scan);
+        let at_hole = |error| match error {
+            MendError::Constraints(fields) => {
+                let at_hole = |f: FieldError| FieldError::new("/hole", f.detail);
+                MendError::Constraints(fields.into_iter().map(at_hole).collect())
+            }
+            other => other,
+        };
+        let selection = Selection::of(scan, &welded, &constraints).map_err(at_hole)?;
+        searched_hole(search, selection.requests.iter().map(|r| r.id))?;
+        Self::prepare(welded, selection, &constraints, call)
+    }
+
+    fn prepare(
+        welded: WeldedScan,
+        selection: Selection,
+        constraints: &Constraints,
+        call: Call,
+    ) -> Result<ScanHoles, MendError> {
+        let (found, limit) = (selection.requests.len(), call.mender.limits.holes);
+        if found > limit {
+            return Err(MendError::TooManyHoles { found, limit });
+        }
+        // Weights that are not loaded are refused before the holes are prepared.
+        let weights = constraints.weights.as_deref();
+        Inpainter::choose(&call.mender.networks, weights, constraints.up)?;
+        let started = Instant::now();
+        let prepare = |request: &HoleRequest| {
+            check_cancelled(call.cancellation)?;
+            prepare_hole(&welded, request.id, &call.mender.limits)
+        };
+        // Collected before an error is taken, so that it is always the first hole's, and not the one that failed first.
+        let holes: Vec<Result<Hole, MendError>> =
+            selection.requests.par_iter().map(prepare).collect();
+        Ok(ScanHoles {
+            holes: holes.into_iter().collect::<Result<_, _>>()?,
+            welded,
+            prepare_ms: milliseconds(started),
+            selection,
+            weights: constraints.weights.clone(),
+            up: constraints.up,
+        })
+    }
+
+    /// Fills the holes with the constraints of the request that they were opened with.
+    ///
+    /// # Errors
+    /// A constraint that does not fit, a hole that cannot be filled; `Abandoned`.
+    pub fn filled<'a>(&'a self, call: Call<'a>) -> Result<FilledScan<'a>, MendError> {
+        let inpainter = self.inpainter(call.mender)?;
+        self.filled_as(&self.selection, inpainter, call)
+    }
+
+    /// Fills the holes with the constraints of a later request. Hole selectors, weights and up are those of the first request where the later
+    /// one leaves them out.
+    ///
+    /// # Errors
+    /// As [`ScanHoles::filled`]; and `Constraints` for a hole that was not opened.
+    pub fn filled_with<'a>(
+        &'a self,
+        scan: &Scan,
+        later: &Constraints,
+        call: Call<'a>,
+    ) -> Result<FilledScan<'a>, MendError> {
+        let selection = match later.holes.is_empty() {
+            true => self.selection.with_constraints(later)?,
+            false => Selection::of(scan, &self.welded, later)?,
+        };
+        let weights = later.weights.as_deref().or(self.weights.as_deref());
+        let up = later.up.or(self.up);
+        let inpainter = Inpainter::choose(&call.mender.networks, weights, up)?;
+        self.filled_as(&selection, inpainter, call)
+    }
+
+    fn filled_as<'a>(
+        &'a self,
+        selection: &Selection,
+        inpainter: Inpainter<'a>,
+        call: Call<'a>,
+    ) -> Result<FilledScan<'a>, MendError> {
+        let started = Instant::now();
+        let drafts = selection.requests.par_iter().map(|request| {
+            check_cancelled(call.cancellation)?;
+            let hole = self.opened(request.id)?;
+            HoleContext::new(hole, &inpainter, &call.mender.limits)?.fill(request)
+        });
+        let drafts: Vec<Result<_, MendError>> = drafts.collect();
+        let mut drafts: Vec<PatchDraft> = drafts.into_iter().collect::<Result<_, _>>()?;
+        separate(&mut drafts);
+        let holes: Vec<Result<_, MendError>> = (drafts.into_par_iter())
+            .map(|draft| draft.measured(&self.welded))
+            .collect();
+        Ok(FilledScan {
+            holes: holes.into_iter().collect::<Result<_, _>>()?,
+            skipped: selection.skipped.clone(),
+            inpainter,
+            fill_ms: milliseconds(started),
+        })
+    }
+
+    /// The scan with the patches of the filled holes, and the report.
+    ///
+    /// # Errors
+    /// When the patches cannot be written.
+    pub fn mended(&self, scan: &Scan, filled: FilledScan) -> Result<Mended, MendError> {
+        let started = Instant::now();
+        let additions = self.additions(scan, &filled);
+        let additions_ms = milliseconds(started);
+        let started = Instant::now();
+        let bytes = scan.write(&additions)?;
+        let mut report = self.report(scan, filled);
+        if let Some(timings) = &mut report.timings {
+            timings.write = milliseconds(started);
+            timings.total += additions_ms + timings.write;
+        }
+        Ok(Mended { bytes, report })
+    }
+
+    /// The patches in the scan's terms.
+    pub fn additions(&self, scan: &Scan, filled: &FilledScan) -> Vec<PatchPrimitive> {
+        let card = filled.inpainter.card();
+        let each = filled.holes.par_iter();
+        each.map(|hole| addition(scan, &self.welded, hole, card))
+            .collect()
+    }
+
+    /// The report of the whole scan.
+    pub fn report(&self, scan: &Scan, filled: FilledScan) -> v1::Report {
+        let mut notes = self.welded.notes(scan);
+        notes.extend(filled.inpainter.note.clone());
+        let holes_ms = self.prepare_ms + filled.fill_ms;
+        let timings = self.welded.timings;
+        v1::Report {
+            version: VERSION.to_owned(),
+            weights: Some(filled.inpainter.weights()),
+            holes: filled.holes.into_iter().map(|h| h.report).collect(),
+            skipped: filled.skipped,
+            timings: Some(v1::ScanTimings {
+                holes: holes_ms,
+                total: timings.weld + timings.loops + holes_ms,
+                ..timings
+            }),
+            notes,
+        }
+    }
+
+    /// Searches where on a hole's grid a point in space belongs.
+    ///
+    /// # Errors
+    /// At `/hole` and `/start` when they do not fit; a failure of the network; `Abandoned`.
+    pub fn search(&self, search: &Search, call: Call) -> Result<v1::AnchorFound, MendError> {
+        let id = searched_hole(search, self.holes.iter().map(|h| h.id))?;
+        let Some(hole) = self.hole(id) else {
+            let detail = format!("hole {id} was not chosen when the scan was opened");
+            let wrong = FieldError::new("/hole", detail);
+            return Err(MendError::Constraints(vec![wrong]));
+        };
+        let inpainter = self.inpainter(call.mender)?;
+        let context = HoleContext::new(hole, &inpainter, &call.mender.limits)?;
+        context.search(search, call.cancellation)
+    }
+
+    /// What fills the holes unless a later request says otherwise.
+    fn inpainter<'a>(&self, mender: &'a NetworkMender) -> Result<Inpainter<'a>, MendError> {
+        Inpainter::choose(&mender.networks, self.weights.as_deref(), self.up)
+    }
+
+    fn hole(&self, id: u32) -> Option<&Hole> {
+        self.holes.iter().find(|h| h.id == id)
+    }
+
+    fn opened(&self, id: u32) -> Result<&Hole, MendError> {
+        self.hole(id).ok_or_else(|| {
+            let opened: Vec<String> = self.holes.iter().map(|h| h.id.to_string()).collect();
+            let detail = format!(
+                "hole {id} was not chosen when the scan was opened; there are: {}",
+                opened.join(", ")
+            );
+            MendError::Constraints(vec![FieldError::new("/holes", detail)])
+        })
+    }
+}
+
+/// The hole that a search names, or the only one of `ids`.
+fn searched_hole(search: &Search, mut ids: impl Iterator<Item = u32>) -> Result<u32, MendError> {
+    match (search.hole, ids.next(), ids.count()) {
+        (Some(id), ..) | (None, Some(id), 0) => Ok(id),
+        (None, _, more) => {
+            let detail = format!("the scan has {} holes; say which one is meant", more + 1);
+            let wrong = FieldError::new("/hole", detail);
+            Err(MendError::Constraints(vec![wrong]))
+        }
+    }
+}
