@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let network = Network::load(&weights, EngineOptions::default())?;
     let mender = NetworkMender::new(Networks::new(network, Vec::new()));
 
-    let scan = Scan::read(&std::fs::read(input)?, &ScanLimits::default())?;
+    let scan = Scan::read(std::fs::read(input)?, &ScanLimits::default())?;
     let mended = mend(&scan, &Constraints::default(), &mender)?;
     std::fs::write(output, &mended.bytes)?;
 

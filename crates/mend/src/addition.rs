@@ -128,7 +128,7 @@ pub fn addition(
 fn is_backed(region: &Region, welded: &WeldedScan) -> bool {
     let backed = region.faces.iter();
     let backed = backed
-        .filter(|f| welded.surface.backed[**f as usize])
+        .filter(|f| welded.surface.two_sided[f.index()])
         .count();
     2 * backed > region.faces.len()
 }

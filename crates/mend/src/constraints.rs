@@ -110,7 +110,7 @@ impl HoleConstraints<'_> {
         let pull = |p: &PlacedPoint| Pull {
             at: p.flat,
             to: p.target,
-            hold: p.firmness,
+            firmness: p.firmness,
         };
         self.points.iter().map(pull).collect()
     }
@@ -277,7 +277,7 @@ mod tests {
             Ok(_) => ("", Vec::new()),
             Err(error) => {
                 let pointers = error.fields().into_iter().map(|f| f.pointer);
-                (error.code(), pointers.collect())
+                (error.code().word, pointers.collect())
             }
         }
     }

@@ -10,7 +10,7 @@ use crate::select::HoleRequest;
 use crate::timings::milliseconds;
 use darn_contract::v1;
 use darn_geometry::mesh::Vec3;
-use darn_geometry::patch::{Patch, Pull, bearable, quality};
+use darn_geometry::patch::{Patch, Pull, quality, stretch_limit};
 
 /// How often a smaller share of the network's movement is tried before the pulls alone move the unedited cloth.
 const MAX_TRIES: usize = 2;
@@ -65,7 +65,7 @@ impl<'a> HoleContext<'a> {
         let (hole, unedited) = (self.hole, &self.unedited);
         let stretch = |patch: &Patch| quality::measure(patch, &hole.region).stretch_max;
         let usual = stretch(&unedited.patch);
-        let most = bearable(usual);
+        let most = stretch_limit(usual);
         let mut share = 1.0;
         for _ in 0..MAX_TRIES {
             let each = unedited.filled.iter().zip(moved);

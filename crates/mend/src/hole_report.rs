@@ -10,6 +10,7 @@ use crate::hole::Hole;
 use crate::timings::milliseconds;
 use crate::welded_scan::{WeldedScan, kind};
 use darn_contract::v1;
+use darn_geometry::mesh::index::VertexId;
 use darn_geometry::mesh::loops::LoopKind;
 use darn_geometry::patch::Patch;
 use darn_geometry::patch::quality::{self, Quality};
@@ -116,8 +117,8 @@ fn loose_pieces_note(hole: &Hole, patch: &Patch, welded: &WeldedScan) -> Option<
             .map(|p| <[f64; 3]>::from(*p))
             .collect(),
     );
-    let is_near = |v: &u32| {
-        let place = <[f64; 3]>::from(welded.surface.mesh.positions[*v as usize]);
+    let is_near = |v: &VertexId| {
+        let place = <[f64; 3]>::from(welded.surface.mesh.positions[v.index()]);
         let nearest = tree.nearest_neighbor(&place);
         nearest.is_some_and(|p| p.distance_2(&place) <= near * near)
     };

@@ -161,6 +161,7 @@ fn refusal(error: MendError) -> Refusal {
 mod tests {
     use super::*;
     use darn_contract::codes;
+    use darn_geometry::mesh::index::LoopId;
     use darn_geometry::mesh::region::RegionError;
 
     #[test]
@@ -168,7 +169,7 @@ mod tests {
         let error = MendError::Region {
             hole: 3,
             source: RegionError::TooLarge {
-                rim: 3,
+                rim: LoopId(3),
                 coordinate: 1e120,
                 limit: 1e100,
             },

@@ -12,7 +12,8 @@ use crate::welded_scan::WeldedScan;
 use darn_contract::v1;
 use darn_geometry::flatten::{self, Chart};
 use darn_geometry::grid::{self, CELLS, Grid, Normalisation};
-use darn_geometry::mesh::denoise::denoised;
+use darn_geometry::mesh::denoise::denoise;
+use darn_geometry::mesh::index::LoopId;
 use darn_geometry::mesh::layers::layers_near;
 use darn_geometry::mesh::region::{self, Region, RegionError};
 use darn_geometry::mesh::{TriMesh, Vec2};
@@ -55,7 +56,7 @@ type Denoise<'a> = &'a dyn Fn(&TriMesh) -> Option<TriMesh>;
 fn without_noise<T>(attempt: impl Fn(Denoise) -> Result<T, MendError>) -> Result<T, MendError> {
     let noisy = Cell::new(false);
     let denoise = |mesh: &TriMesh| {
-        let smooth = denoised(mesh);
+        let smooth = denoise(mesh);
         noisy.set(noisy.get() || smooth.is_some());
         smooth
     };
@@ -182,11 +183,11 @@ impl Preparation<'_> {
             let others = layers_near(mesh, &flat.region, beyond);
             let plan = patch::plan_in(mesh, seen, &flat.chart, &limits.patch)
                 .and_then(|plan| match &flat.smooth {
-                    Some(_) => plan.joining(&flat.region.mesh.positions),
+                    Some(_) => plan.with_region_at(&flat.region.mesh.positions),
                     None => Ok(plan),
                 })
                 .map_err(|source| MendError::Patch { hole: id, source })?;
-            Ok::<_, MendError>((plan.among(&others), milliseconds(started)))
+            Ok::<_, MendError>((plan.with_layers(&others), milliseconds(started)))
         };
         let (sampled, planned) = rayon::join(sample, plan);
         let sampled = sampled?;
@@ -247,7 +248,7 @@ fn grown(welded: &WeldedScan, id: u32, reach: f64) -> Result<Region, RegionError
         &welded.surface.mesh,
         &welded.topology,
         &welded.loops,
-        id as usize,
+        LoopId(id),
         reach,
     )
 }
@@ -280,12 +281,12 @@ fn may_shrink(error: &MendError) -> bool {
 mod tests {
     use super::*;
     use darn_geometry::mesh::Vec3;
-    use darn_geometry::mesh::shapes::{shaken, sheet};
+    use darn_geometry::mesh::shapes::{jitter, sheet};
 
     #[test]
     fn the_cloth_with_its_noise_is_tried_last() {
         let clean = sheet(30, |_, _| true, |u, v| Vec3::new(u, v, 0.0));
-        let noisy = shaken(&clean, 0.3 / 30.0, 7);
+        let noisy = jitter(&clean, 0.3 / 30.0, 7);
         let crosses = || MendError::Patch {
             hole: 1,
             source: PatchError::RimCrosses,

@@ -64,7 +64,7 @@ impl Selection {
         if constraints.holes.is_empty() {
             let loops = welded.loops.iter();
             let fillable = loops.filter(|l| reason_to_skip(scan, welded, l).is_none());
-            fillable.for_each(|l| requests.add(l.id));
+            fillable.for_each(|l| requests.add(l.id.0));
         }
         for (i, selector) in constraints.holes.iter().enumerate() {
             match find(scan, welded, selector) {
@@ -81,7 +81,7 @@ impl Selection {
             return Err(MendError::NonManifold { hole });
         }
         let skipped: Vec<v1::Skipped> = (welded.loops.iter())
-            .filter(|l| !requests.0.contains_key(&l.id))
+            .filter(|l| !requests.0.contains_key(&l.id.0))
             .map(|l| skipped(scan, welded, l))
             .collect();
         if requests.0.is_empty() {
@@ -190,7 +190,7 @@ fn fillable(scan: &Scan, welded: &WeldedScan, rim: &BoundaryLoop) -> Result<u32,
             code: "non_manifold",
             ..
         })
-        | None => Ok(rim.id),
+        | None => Ok(rim.id.0),
         Some(SkipReason { phrase, .. }) => {
             Err(format!("loop {} is never filled: it is {phrase}", rim.id))
         }
@@ -258,7 +258,7 @@ mod tests {
         let welded = WeldedScan::of(&scan);
         let of_kind = |kind| {
             let ids = welded.loops.iter().filter(|l| l.kind == kind);
-            ids.map(|l| l.id).collect::<Vec<u32>>()
+            ids.map(|l| l.id.0).collect::<Vec<u32>>()
         };
         let mut holes = of_kind(LoopKind::Hole);
         holes.sort_by(|a, b| {

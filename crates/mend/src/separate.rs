@@ -13,7 +13,7 @@ pub fn separate(drafts: &mut [PatchDraft]) {
         let own = &mut rest[0];
         let others = near(own, before);
         if !others.faces.is_empty() {
-            own.hole.plan.keep_off(&mut own.patch, &others);
+            own.hole.plan.separate(&mut own.patch, &others);
         }
     }
 }
@@ -46,7 +46,11 @@ fn near(own: &PatchDraft, others: &[PatchDraft]) -> TriMesh {
 /// The rim's vertices as vertices of the welded scan.
 fn rim<'a>(draft: &'a PatchDraft) -> impl Iterator<Item = u32> + 'a {
     let region = &draft.hole.region;
-    draft.patch.rim.iter().map(|v| region.vertices[*v as usize])
+    draft
+        .patch
+        .rim
+        .iter()
+        .map(|v| region.vertices[*v as usize].0)
 }
 
 /// The least and the largest coordinates.

@@ -13,7 +13,7 @@ use darn_contract::{Anchor, Edit, Gesture};
 use darn_geometry::mesh::TriMesh;
 use darn_geometry::mesh::loops::LoopKind;
 use darn_geometry::mesh::shapes::holed_sheet;
-use darn_gltf_scan::export::{Fresh, glb};
+use darn_gltf_scan::export::{NewMesh, glb};
 use darn_gltf_scan::{Scan, ScanLimits};
 use darn_net::{
     AnchorLoss, AnchorProblem, GridPlanes, NetError, Network, Networks, Runtime, TrainingCard,
@@ -76,7 +76,7 @@ pub fn mender() -> &'static Arc<NetworkMender> {
 /// A mesh as a scan.
 pub fn scan_of(mesh: &TriMesh) -> Scan {
     let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| p.cast().into()).collect();
-    let fresh = Fresh {
+    let fresh = NewMesh {
         name: "cloth",
         positions: &positions,
         normals: &vec![[0.0, 0.0, 1.0]; positions.len()],
@@ -84,7 +84,7 @@ pub fn scan_of(mesh: &TriMesh) -> Scan {
         faces: &mesh.faces,
     };
     let bytes = glb(&fresh).expect("a small file");
-    Scan::read(&bytes, &ScanLimits::default()).expect("a readable scan")
+    Scan::read(bytes.clone(), &ScanLimits::default()).expect("a readable scan")
 }
 
 /// A round hole in a flat sheet; on the chart it is a disk of radius ¼ in the middle.
@@ -93,7 +93,7 @@ pub fn context() -> HoleContext<'static> {
         let welded = WeldedScan::of(&scan_of(&holed_sheet(30, 0.15)));
         let mut loops = welded.loops.iter();
         let hole = loops.find(|l| l.kind == LoopKind::Hole).expect("a hole");
-        prepare_hole(&welded, hole.id, &mender().limits).expect("cloth that lies flat")
+        prepare_hole(&welded, hole.id.0, &mender().limits).expect("cloth that lies flat")
     });
     let inpainter = Inpainter::choose(&mender().networks, None, None).expect("a network");
     HoleContext::new(&HOLE, &inpainter, &mender().limits).expect("a patch")

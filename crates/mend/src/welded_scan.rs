@@ -12,8 +12,8 @@ use darn_gltf_scan::Scan;
 
 /// The welded surface of a scan and its loops.
 pub struct WeldedScan {
-    /// The welded mesh; `face_of` leads from its faces back to the scan's.
-    pub surface: Welded,
+    /// The welded mesh; `soup_face` leads from its faces back to the scan's.
+    pub surface: WeldedMesh,
     /// Its topology.
     pub topology: Topology,
     /// Its boundary loops; a loop's id is its index here.
@@ -62,8 +62,8 @@ impl WeldedScan {
     }
 
     /// The scan's face that a welded face was made of.
-    pub fn source(&self, scan: &Scan, face: u32) -> Option<SourceFace> {
-        let own = *self.surface.face_of.get(face as usize)?;
+    pub fn source(&self, scan: &Scan, face: FaceId) -> Option<SourceFace> {
+        let own = *self.surface.soup_face.get(face.index())?;
         Some(SourceFace {
             part: scan.part_of_face(own)?,
             corners: *scan.surface.faces.get(own as usize)?,
@@ -75,7 +75,7 @@ impl WeldedScan {
         let part = rim
             .half_edges
             .first()
-            .and_then(|h| self.source(scan, h / 3))
+            .and_then(|h| self.source(scan, h.face()))
             .map(|source| source.part);
         v1::Loop {
             id: rim.id.0,
@@ -96,7 +96,7 @@ impl WeldedScan {
     /// Whether every mesh that a loop lies on is drawn here by the first of its nodes. A patch on a mesh shows at every node that draws the
     /// mesh.
     pub fn on_first_instance(&self, scan: &Scan, rim: &BoundaryLoop) -> bool {
-        let mut sources = rim.half_edges.iter().map(|h| self.source(scan, h / 3));
+        let mut sources = rim.half_edges.iter().map(|h| self.source(scan, h.face()));
         sources.all(|s| s.is_none_or(|s| scan.parts[s.part].first_instance))
     }
 
@@ -139,7 +139,7 @@ impl WeldedScan {
 
     /// Number of points in which boundary loops touch (bow-ties).
     fn touching(&self) -> usize {
-        let place = |v: &u32| self.surface.mesh.positions[*v as usize];
+        let place = |v: &VertexId| self.surface.mesh.positions[v.index()];
         let ends = self.loops.iter().flat_map(|l| &l.vertices).map(place);
         let mut places: Vec<[u64; 3]> = ends.map(|p| [p.x, p.y, p.z].map(f64::to_bits)).collect();
         places.sort_unstable();

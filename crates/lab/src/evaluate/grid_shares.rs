@@ -9,7 +9,6 @@ use serde::Serialize;
 
 use super::cases::{EvaluationCase, extent};
 use super::hole_kind::{HoleKind, SCAN_SIDE};
-use super::patched::inside;
 use crate::scarffolds::holed_scan::holed_scan;
 use crate::scarffolds::sheets::SimulatedSheet;
 use darn_geometry::flatten::{self, Chart, FlattenLimits};
@@ -18,6 +17,7 @@ use darn_geometry::mesh::loops::{LoopKind, boundary_loops};
 use darn_geometry::mesh::region::{Region, grow};
 use darn_geometry::mesh::topology::Topology;
 use darn_geometry::mesh::{TriMesh, Vec2};
+use darn_geometry::polygon::inside;
 
 /// Share of the grid's side that a hole should take; as in `mend`.
 const HOLE_SHARE: f64 = 0.5;

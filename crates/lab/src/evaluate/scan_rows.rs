@@ -15,7 +15,6 @@ use crate::scarffolds::holed_scan::{HoledScan, holed_scan};
 use crate::scarffolds::sheets::SimulatedSheet;
 use darn_geometry::mesh::curvature::{angle_defect, face_areas, vertex_normals};
 use darn_geometry::mesh::index::VertexId;
-use darn_geometry::mesh::index::VertexId;
 use darn_geometry::mesh::intersect::intersections_with;
 use darn_geometry::mesh::topology::Topology;
 use darn_geometry::mesh::{TriMesh, Vec3};
