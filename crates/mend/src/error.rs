@@ -98,8 +98,8 @@ pub enum MendError {
 }
 
 impl MendError {
-    /// The code of the error: a stable word for programs. This is the only place that gives errors their codes; which class and status a code
-    /// has stands in the contract.
+    /// The code of the error: a stable word for programs. No other place gives errors
+    /// their codes.
     pub fn code(&self) -> &'static str {
         match self {
             MendError::Unreadable(error) => match error {
