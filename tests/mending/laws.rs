@@ -165,7 +165,8 @@ fn texture_coordinates_continue_through_the_patch() {
 #[test]
 fn a_texture_seam_continues_through_the_patch() {
     let cut = holed(sheet(1), &ROUND);
-    // Right of the middle the texture is a second island, mirrored; vertices on the border between the islands are doubled.
+    // Right of the middle the texture is a second island, mirrored; vertices on the border between the islands are
+    // doubled.
     let mut mesh = cut.mesh.clone();
     let mut texture: Vec<[f32; 2]> = (cut.rest.iter())
         .map(|p| [0.4 * p.x as f32, p.y as f32])

@@ -8,7 +8,8 @@ use darn_geometry::mesh::{TriMesh, Vec3};
 
 use super::cloth::{MendedScan, mended, packed};
 
-/// A wavy sheet of squares of two triangles each: `#` has both, `/` only the lower one, `7` only the upper one, `.` none.
+/// A wavy sheet of squares of two triangles each: `#` has both, `/` only the lower one, `7` only the upper one, `.`
+/// none.
 fn sheet_of(rows: &[String]) -> TriMesh {
     let n = rows.len();
     let at = |k: usize| {
@@ -48,7 +49,8 @@ fn two_squares() -> Vec<String> {
     (0..18).map(row).collect()
 }
 
-/// Mends a sheet and checks its triangles, by the positions of their corners: closed and manifold wherever there is a patch.
+/// Mends a sheet and checks its triangles, by the positions of their corners: closed and manifold wherever there is a
+/// patch.
 fn mends_soundly(rows: &[String]) {
     let bytes = packed(&sheet_of(rows), &[]);
     let mended = mended(&bytes, &Constraints::default()).expect("a closed sheet");

@@ -1,4 +1,5 @@
-//! Mends a scan and prints what was done to its holes: `cargo run --release -p darn-mend --example mend -- SCAN.glb MENDED.glb`
+//! Mends a scan and prints what was done to its holes: `cargo run --release -p darn-mend --example mend -- SCAN.glb
+//! MENDED.glb`
 //!
 //! It runs in the repository's root, where `weights/standard.safetensors` lies.
 

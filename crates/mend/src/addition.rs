@@ -16,7 +16,8 @@ use darn_geometry::patch::{Patch, quality};
 use darn_gltf_scan::{PatchPoint, PatchPrimitive, Scan, ScanPart};
 use darn_net::WeightsCard;
 
-/// The patch of a filled hole as a primitive of the part that most of its rim belongs to; `card` is that of the network that filled it.
+/// The patch of a filled hole as a primitive of the part that most of its rim belongs to; `card` is that of the network
+/// that filled it.
 pub fn addition(
     scan: &Scan,
     welded: &WeldedScan,
@@ -158,7 +159,8 @@ fn columns_of(part: &ScanPart, vertex: u32) -> Vec<f64> {
     texcoords.chain(colors).map(f64::from).collect()
 }
 
-/// Normals of the patch's vertices. The scan's triangles around the patch count, too, so that the shading is continuous at the seam.
+/// Normals of the patch's vertices. The scan's triangles around the patch count, too, so that the shading is continuous
+/// at the seam.
 fn normals(patch: &Patch, region: &Region) -> Vec<Vec3> {
     let all = vertex_normals(&quality::joined(patch, region));
     let inner = region.mesh.positions.len();
@@ -167,8 +169,8 @@ fn normals(patch: &Patch, region: &Region) -> Vec<Vec3> {
     rim.chain(all[inner..].iter().copied()).map(solid).collect()
 }
 
-/// `extras.darn` of a patch: that it is reconstructed, by which version and weights, and its numbers. No timings, as the same input gives the
-/// same bytes.
+/// `extras.darn` of a patch: that it is reconstructed, by which version and weights, and its numbers. No timings, as
+/// the same input gives the same bytes.
 fn provenance(report: &v1::HoleReport, card: &WeightsCard) -> serde_json::Value {
     let patch = report.patch.clone().unwrap_or_default();
     let chart = report.chart.unwrap_or_default();

@@ -17,7 +17,8 @@ use darn_geometry::grid::{CELLS, SIDE, cell_centre};
 use darn_geometry::mesh::{Vec2, Vec3};
 use darn_net::{AnchorLoss, AnchorProblem};
 
-/// Targets farther from the hole than this many of its extents are moved to that distance along the same line: the network computes in f32.
+/// Targets farther from the hole than this many of its extents are moved to that distance along the same line: the
+/// network computes in f32.
 const FAR: f64 = 100.0;
 
 /// The network's loss of an anchor at a target, for each cell.
@@ -88,7 +89,8 @@ impl HoleContext<'_> {
     /// Searches as asked, and reports the place and the path of the search.
     ///
     /// # Errors
-    /// At `/start` when that does not lie in the hole; `NoCells` when no cell does; a failure of the network; `Abandoned`.
+    /// At `/start` when that does not lie in the hole; `NoCells` when no cell does; a failure of the network;
+    /// `Abandoned`.
     pub fn search(
         &self,
         search: &Search,

@@ -39,8 +39,8 @@ impl<'a> HoleContext<'a> {
     /// Places a request's anchors and gestures on the cloth. Anchors without uv are searched for.
     ///
     /// # Errors
-    /// `Constraints` for every uv that does not lie in the hole, `OutOfReach` for hard anchors that the cloth cannot reach; whatever
-    /// [`HoleContext::place_anchor`] fails with.
+    /// `Constraints` for every uv that does not lie in the hole, `OutOfReach` for hard anchors that the cloth cannot
+    /// reach; whatever [`HoleContext::place_anchor`] fails with.
     pub fn constraints(&self, request: &HoleRequest) -> Result<HoleConstraints<'a>, MendError> {
         let hole = self.hole;
         check_uvs(hole, request)?;
@@ -87,7 +87,8 @@ impl<'a> HoleContext<'a> {
 }
 
 impl HoleConstraints<'_> {
-    /// Each cell that should move and how far, the mean where several points lie in one; in order of the cells' indices.
+    /// Each cell that should move and how far, the mean where several points lie in one; in order of the cells'
+    /// indices.
     pub fn moves(&self) -> Vec<CellMove> {
         let mut sums: BTreeMap<usize, (Vec3, f64)> = BTreeMap::new();
         for point in &self.points {
@@ -239,7 +240,7 @@ mod tests {
     use proptest::prelude::*;
 
     const MIDDLE: [f64; 2] = [0.5, 0.5];
-    /// Nowhere near the hole, which is a disk of radius ¼ in the middle of the chart.
+    /// Nowhere near the hole, which is about a disk of radius ¼ in the middle of the chart.
     const OUTSIDE: [f64; 2] = [0.05, 0.9];
 
     /// Where the unedited cloth is.
@@ -431,7 +432,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(24))]
         #[test]
         fn soft_anchors_anywhere_move_cells_of_the_hole_and_stay_within_reach(
-            places in prop::collection::vec((0.36..0.64f64, 0.36..0.64f64, prop::array::uniform3(-2.0..2.0f64)), 1..6)
+            places in prop::collection::vec((0.4..0.6f64, 0.4..0.6f64, prop::array::uniform3(-2.0..2.0f64)), 1..6)
         ) {
             let context = context();
             let extent = context.hole.extent();

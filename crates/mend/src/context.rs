@@ -1,4 +1,5 @@
-//! A hole with everything that filling it needs; `anchor_search`, `constraints`, `moved_fill` and `fill_hole` give it their methods.
+//! A hole with everything that filling it needs; `anchor_search`, `constraints`, `moved_fill` and `fill_hole` give it
+//! their methods.
 
 use std::sync::Arc;
 

@@ -31,7 +31,8 @@ impl<'a> HoleContext<'a> {
     /// Fills the hole as a request asks.
     ///
     /// # Errors
-    /// Constraints that do not fit the hole, hard anchors out of reach, a hole that cannot be meshed; a failure of the network.
+    /// Constraints that do not fit the hole, hard anchors out of reach, a hole that cannot be meshed; a failure of the
+    /// network.
     pub fn fill(&self, request: &HoleRequest) -> Result<PatchDraft<'a>, MendError> {
         let (hole, unedited) = (self.hole, &self.unedited);
         let constraints = self.constraints(request)?;
@@ -59,8 +60,8 @@ impl<'a> HoleContext<'a> {
         })
     }
 
-    /// The patch of moved cloth, with as much of the network's movement as the cloth bears: the network's answer to targets that lie far
-    /// away is itself stretched.
+    /// The patch of moved cloth, with as much of the network's movement as the cloth bears: the network's answer to
+    /// targets that lie far away is itself stretched.
     fn constrained_patch(&self, moved: &[Vec3], pulls: &[Pull]) -> Result<Patch, MendError> {
         let (hole, unedited) = (self.hole, &self.unedited);
         let stretch = |patch: &Patch| quality::measure(patch, &hole.region).stretch_max;

@@ -101,8 +101,8 @@ fn patch_report(patch: &Patch, quality: &Quality) -> v1::PatchReport {
     }
 }
 
-/// A note on loose pieces of the scan that lie where the patch is. The chart does not contain them, as they are not connected to the cloth
-/// around the hole.
+/// A note on loose pieces of the scan that lie where the patch is. The chart does not contain them, as they are not
+/// connected to the cloth around the hole.
 fn loose_pieces_note(hole: &Hole, patch: &Patch, welded: &WeldedScan) -> Option<String> {
     let rim = &welded.loops[hole.id as usize];
     let others =

@@ -1,12 +1,15 @@
-//! Mends scans: synchronous functions that take a scan and give the mended scan and a report. The only crate that knows all stages.
+//! Mends scans: synchronous functions that take a scan and give the mended scan and a report. The only crate that knows
+//! all stages.
 //!
-//! In order: `welded_scan` welds the triangles and finds the boundary loops, `select` matches a request to loops, `prepare` lays the cloth
-//! around a hole flat and makes a `hole` of it, `constraints` places anchors and gestures on it, `moved_fill` asks the network for cloth that
-//! moved, `fill_hole` meshes it, `separate` pushes neighbouring patches apart, `hole_report` measures the patch, and `addition` writes it in
-//! glTF terms. `scan_holes` runs these stages for all holes of a scan; [`mend`] drops it, a [`ScanSession`] keeps it. `edit` holds the
-//! gestures and the anchor search. [`SharedMender`] is the port's [`Mender`](darn_contract::port::Mender).
+//! In order: `welded_scan` welds the triangles and finds the boundary loops, `select` matches a request to loops,
+//! `prepare` lays the cloth around a hole flat and makes a `hole` of it, `constraints` places anchors and gestures on
+//! it, `moved_fill` asks the network for cloth that moved, `fill_hole` meshes it, `separate` pushes neighbouring
+//! patches apart, `hole_report` measures the patch, and `addition` writes it in glTF terms. `scan_holes` runs these
+//! stages for all holes of a scan; [`mend`] drops it, a [`ScanSession`] keeps it. `edit` holds the gestures and the
+//! anchor search. [`SharedMender`] is the port's [`Mender`](darn_contract::port::Mender).
 //!
-//! No async, no I/O, and no clocks except for the report's timings. The bytes depend on scan, constraints, weights and version alone.
+//! No async, no I/O, and no clocks except for the report's timings. The bytes depend on scan, constraints, weights and
+//! version alone.
 
 mod addition;
 mod anchor_search;
@@ -54,10 +57,12 @@ use welded_scan::WeldedScan;
 /// darn's version, as reports and patches name it.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// Fills the holes of a scan that the constraints choose: by default all of them, and never an outer boundary or the end of a tube.
+/// Fills the holes of a scan that the constraints choose: by default all of them, and never an outer boundary or the
+/// end of a tube.
 ///
 /// # Errors
-/// A constraint that does not fit the scan, a chosen hole that cannot be filled, no hole at all; `Abandoned` when the call is cancelled.
+/// A constraint that does not fit the scan, a chosen hole that cannot be filled, no hole at all; `Abandoned` when the
+/// call is cancelled.
 pub fn mend<'a>(
     scan: &Scan,
     constraints: &Constraints,
@@ -68,10 +73,12 @@ pub fn mend<'a>(
     holes.mended(scan, holes.filled(call)?)
 }
 
-/// Searches where on a hole's grid a point in space belongs: the cell where an anchor at that point brings the cloth nearest to it.
+/// Searches where on a hole's grid a point in space belongs: the cell where an anchor at that point brings the cloth
+/// nearest to it.
 ///
 /// # Errors
-/// A hole that does not exist or cannot be laid flat, several holes of which the search names none; `Abandoned` when the call is cancelled.
+/// A hole that does not exist or cannot be laid flat, several holes of which the search names none; `Abandoned` when
+/// the call is cancelled.
 pub fn optimize_anchor<'a>(
     scan: &Scan,
     search: &Search,

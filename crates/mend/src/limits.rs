@@ -40,8 +40,9 @@ impl Default for MendLimits {
 pub enum EditedFill {
     /// The cloth is the network's answer to the grid with the moved cells marked as known.
     Plain,
-    /// The cloth is the unedited cloth plus a difference: the network's answer to the moved cells minus its answer to the same cells unmoved.
-    /// To mark a cell as known changes the answer a little by itself, which no constraint asked for.
+    /// The cloth is the unedited cloth plus a difference: the network's answer to the moved cells minus its answer to
+    /// the same cells unmoved. To mark a cell as known changes the answer a little by itself, which no constraint asked
+    /// for.
     #[default]
     Difference,
 }

@@ -11,7 +11,8 @@ use darn_net::Averaging;
 impl HoleContext<'_> {
     /// Every cell's position, scene space, when some cells of the hole move away from the unedited cloth.
     ///
-    /// The network is given a moved cell's new position, marked as known. That is a soft constraint: the network may stay away from it.
+    /// The network is given a moved cell's new position, marked as known. That is a soft constraint: the network may
+    /// stay away from it.
     ///
     /// # Errors
     /// A failure of the network.

@@ -1,4 +1,5 @@
-//! A small picture of a hole's chart: the scanned cloth light, the new cloth tinted, both shaded by their folds, the rim as a line.
+//! A small picture of a hole's chart: the scanned cloth light, the new cloth tinted, both shaded by their folds, the
+//! rim as a line.
 
 use image::{Rgb, RgbImage};
 
@@ -14,7 +15,8 @@ const CLOTH: [f64; 3] = [214.0, 219.0, 228.0];
 const MENDED: [f64; 3] = [236.0, 170.0, 118.0];
 const RIM: Rgb<u8> = Rgb([120, 60, 30]);
 
-/// Draws the chart as PNG: u runs right, v up. The light comes from one side, so that every fold has a bright and a dark side.
+/// Draws the chart as PNG: u runs right, v up. The light comes from one side, so that every fold has a bright and a
+/// dark side.
 ///
 /// # Errors
 /// Whatever the encoder fails with.

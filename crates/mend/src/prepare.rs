@@ -31,11 +31,12 @@ const COLLAR: f64 = 0.2;
 /// Tries with smaller and smaller regions.
 const MAX_TRIES: usize = 4;
 
-/// Prepares the hole of a loop. Tries smaller and smaller regions when one gives no usable chart, and at last the cloth with the scanner's
-/// noise.
+/// Prepares the hole of a loop. Tries smaller and smaller regions when one gives no usable chart, and at last the cloth
+/// with the scanner's noise.
 ///
 /// # Errors
-/// `Region`, `Flatten`, `TooLittleKnown` or `Patch`, whichever stage fails; of several tries the last one's, of the denoised cloth.
+/// `Region`, `Flatten`, `TooLittleKnown` or `Patch`, whichever stage fails; of several tries the last one's, of the
+/// denoised cloth.
 pub fn prepare_hole(welded: &WeldedScan, id: u32, limits: &MendLimits) -> Result<Hole, MendError> {
     let reach = reach_for(estimated_extent(welded, id));
     without_noise(|denoise| {
@@ -258,7 +259,8 @@ fn reach_for(extent: f64) -> f64 {
     0.5 * extent * (1.0 / HOLE_SHARE - 1.0)
 }
 
-/// Larger side of the hole's box in a chart of a narrow collar around it; where the collar cannot be laid flat, that of a round hole.
+/// Larger side of the hole's box in a chart of a narrow collar around it; where the collar cannot be laid flat, that of
+/// a round hole.
 fn estimated_extent(welded: &WeldedScan, id: u32) -> f64 {
     let round = welded.loops[id as usize].length / std::f64::consts::PI;
     let collar = grown(welded, id, COLLAR * reach_for(round));

@@ -1,5 +1,5 @@
-//! All holes of a scan that a request chose: prepared once, filled for this request and for later ones. A single call drops them, a session
-//! keeps them.
+//! All holes of a scan that a request chose: prepared once, filled for this request and for later ones. A single call
+//! drops them, a session keeps them.
 
 use std::time::Instant;
 
@@ -55,7 +55,8 @@ impl ScanHoles {
     /// Finds the holes that a request asks for and prepares them.
     ///
     /// # Errors
-    /// A constraint that does not fit the scan, no hole at all, too many holes, a hole that cannot be laid flat; `Abandoned`.
+    /// A constraint that does not fit the scan, no hole at all, too many holes, a hole that cannot be laid flat;
+    /// `Abandoned`.
     pub fn open(
         scan: &Scan,
         constraints: &Constraints,
@@ -132,8 +133,8 @@ impl ScanHoles {
         self.filled_as(&self.selection, inpainter, call)
     }
 
-    /// Fills the holes with the constraints of a later request. Hole selectors, weights and up are those of the first request where the later
-    /// one leaves them out.
+    /// Fills the holes with the constraints of a later request. Hole selectors, weights and up are those of the first
+    /// request where the later one leaves them out.
     ///
     /// # Errors
     /// As [`ScanHoles::filled`]; and `Constraints` for a hole that was not opened.

@@ -1,4 +1,5 @@
-//! Matches a request to the loops of a scan: which loops it fills, and which anchors and gestures belong to which of them.
+//! Matches a request to the loops of a scan: which loops it fills, and which anchors and gestures belong to which of
+//! them.
 
 use std::collections::BTreeMap;
 
@@ -52,8 +53,8 @@ impl Selection {
     /// Matches a request to the loops of a scan.
     ///
     /// # Errors
-    /// `Constraints` for every selector, anchor or gesture that matches no loop to fill; `NonManifold` when the rim of a selected hole is no
-    /// closed line; `NoHoles` when nothing is selected and there is no hole.
+    /// `Constraints` for every selector, anchor or gesture that matches no loop to fill; `NonManifold` when the rim of
+    /// a selected hole is no closed line; `NoHoles` when nothing is selected and there is no hole.
     pub fn of(
         scan: &Scan,
         welded: &WeldedScan,

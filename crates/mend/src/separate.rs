@@ -1,12 +1,13 @@
-//! Pushes the patches of one scan apart where they come near each other: each hole is filled without regard to the others.
+//! Pushes the patches of one scan apart where they come near each other: each hole is filled without regard to the
+//! others.
 
 use std::collections::HashSet;
 
 use crate::fill_hole::PatchDraft;
 use darn_geometry::mesh::{TriMesh, Vec3};
 
-/// Pushes every patch away from those before it where their boxes meet. The drafts are in order of id, so that the result does not depend on
-/// threads.
+/// Pushes every patch away from those before it where their boxes meet. The drafts are in order of id, so that the
+/// result does not depend on threads.
 pub fn separate(drafts: &mut [PatchDraft]) {
     for own in 1..drafts.len() {
         let (before, rest) = drafts.split_at_mut(own);
@@ -18,8 +19,8 @@ pub fn separate(drafts: &mut [PatchDraft]) {
     }
 }
 
-/// The triangles of other patches whose box meets the box of a patch. Triangles with a vertex on the patch's own rim touch it there and are
-/// left out.
+/// The triangles of other patches whose box meets the box of a patch. Triangles with a vertex on the patch's own rim
+/// touch it there and are left out.
 fn near(own: &PatchDraft, others: &[PatchDraft]) -> TriMesh {
     let (low, high) = bounds(&own.patch.positions);
     let on_rim: HashSet<u32> = rim(own).collect();

@@ -69,8 +69,8 @@ impl ScanSession {
         }
     }
 
-    /// Bytes of memory that it holds, estimated: half as much again as is counted, as allocators round up and sparse factors fill in. Measured:
-    /// a thousand sessions counted at 4.2 MiB each took 6.0 MiB each.
+    /// Bytes of memory that it holds, estimated: half as much again as is counted, as allocators round up and sparse
+    /// factors fill in. Measured: a thousand sessions counted at 4.2 MiB each took 6.0 MiB each.
     pub fn bytes(&self) -> usize {
         let holes: usize = self.holes.holes.iter().map(Hole::bytes).sum();
         let described: usize = self.described.holes.iter().map(hole_bytes).sum();
@@ -116,8 +116,8 @@ pub struct SessionCall<'a> {
 }
 
 impl<'a> SessionCall<'a> {
-    /// The whole scan mended: the bytes that [`mend`](crate::mend) gives for the same constraints. Holes, weights and up are those of the opening
-    /// where `constraints` leaves them out.
+    /// The whole scan mended: the bytes that [`mend`](crate::mend) gives for the same constraints. Holes, weights and
+    /// up are those of the opening where `constraints` leaves them out.
     ///
     /// # Errors
     /// As [`mend`](crate::mend).
@@ -139,7 +139,8 @@ impl<'a> SessionCall<'a> {
         Ok((bytes, self.session.report(filled)))
     }
 
-    /// The positions of the patches' vertices in scene space: one list for each hole, in order of id, each in the order of its `patch_uvs`.
+    /// The positions of the patches' vertices in scene space: one list for each hole, in order of id, each in the order
+    /// of its `patch_uvs`.
     ///
     /// # Errors
     /// As [`mend`](crate::mend).

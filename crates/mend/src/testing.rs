@@ -23,8 +23,8 @@ use darn_net::{
 /// Where the loss of every anchor is least for [`PlateRuntime`].
 pub const BEST_UV: [f32; 2] = [0.55, 0.46];
 
-/// A network without weights: its prediction is the smooth plate that it is shown, and the loss of an anchor is the squared distance from
-/// [`BEST_UV`].
+/// A network without weights: its prediction is the smooth plate that it is shown, and the loss of an anchor is the
+/// squared distance from [`BEST_UV`].
 #[derive(Debug)]
 struct PlateRuntime;
 
@@ -87,7 +87,7 @@ pub fn scan_of(mesh: &TriMesh) -> Scan {
     Scan::read(bytes.clone(), &ScanLimits::default()).expect("a readable scan")
 }
 
-/// A round hole in a flat sheet; on the chart it is a disk of radius ¼ in the middle.
+/// A round hole in a flat sheet; on the chart it is about a disk of radius ¼ in the middle.
 pub fn context() -> HoleContext<'static> {
     static HOLE: LazyLock<Hole> = LazyLock::new(|| {
         let welded = WeldedScan::of(&scan_of(&holed_sheet(30, 0.15)));

@@ -93,8 +93,8 @@ impl WeldedScan {
         }
     }
 
-    /// Whether every mesh that a loop lies on is drawn here by the first of its nodes. A patch on a mesh shows at every node that draws the
-    /// mesh.
+    /// Whether every mesh that a loop lies on is drawn here by the first of its nodes. A patch on a mesh shows at every
+    /// node that draws the mesh.
     pub fn on_first_instance(&self, scan: &Scan, rim: &BoundaryLoop) -> bool {
         let mut sources = rim.half_edges.iter().map(|h| self.source(scan, h.face()));
         sources.all(|s| s.is_none_or(|s| scan.parts[s.part].first_instance))

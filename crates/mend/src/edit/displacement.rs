@@ -11,9 +11,11 @@ const MAX_SWEEPS: usize = 400;
 /// The sweeps end with one that moves no cell by more than this share of the largest displacement.
 const TOLERANCE: f64 = 1e-7;
 
-/// The discrete harmonic displacement of every cell (4096 of them, zero outside the hole) that has the given values at the `fixed` cells.
+/// The discrete harmonic displacement of every cell (4096 of them, zero outside the hole) that has the given values at
+/// the `fixed` cells.
 ///
-/// By the maximum principle no cell moves farther than the farthest of the fixed ones. Fixed cells outside the hole have no effect.
+/// By the maximum principle no cell moves farther than the farthest of the fixed ones. Fixed cells outside the hole
+/// have no effect.
 pub fn harmonic_displacement(hole: &HoleCells, fixed: &[CellMove]) -> Vec<Vec3> {
     let mut moved = vec![Vec3::zeros(); CELLS];
     let mut open: Vec<bool> = (0..CELLS).map(|k| hole.contains(k)).collect();

@@ -1,5 +1,5 @@
-//! Turns gestures into points of the cloth with targets: grab moves one point, twist turns a disk, pinch makes a fold between two points.
-//! Each gesture starts from the cloth as the gestures before it left it.
+//! Turns gestures into points of the cloth with targets: grab moves one point, twist turns a disk, pinch makes a fold
+//! between two points. Each gesture starts from the cloth as the gestures before it left it.
 
 use std::cell::OnceCell;
 
@@ -14,7 +14,8 @@ use darn_geometry::grid::{CELLS, SIDE, cell_at, cell_centre, evaluate};
 use darn_geometry::mesh::{Vec2, Vec3};
 use darn_geometry::patch::Firmness;
 
-/// Most cells of a disk that a twist places: enough that the disk keeps its shape, few enough that the network shapes the folds around it.
+/// Most cells of a disk that a twist places: enough that the disk keeps its shape, few enough that the network shapes
+/// the folds around it.
 const MAX_TWIST_CELLS: usize = 40;
 /// Height of a fold as a share of the height of a roof with straight sides: cloth is rounder than a roof.
 const ROUNDNESS: f64 = 0.8;
@@ -28,7 +29,8 @@ pub struct PlacedPoints<'a> {
     points: Vec<PlacedPoint>,
     /// For each cell of the grid the index of the last point placed in it.
     by_cell: Vec<Option<usize>>,
-    /// The displacement of every cell. Computed when a gesture first needs it, and dropped when a gesture has placed its points.
+    /// The displacement of every cell. Computed when a gesture first needs it, and dropped when a gesture has placed
+    /// its points.
     displacements: OnceCell<Vec<Vec3>>,
 }
 
@@ -63,8 +65,8 @@ impl<'a> PlacedPoints<'a> {
         &self.points
     }
 
-    /// Applies a gesture. Returns the indices, among [`PlacedPoints::points`], of the points that it moved; later gestures may move them
-    /// further.
+    /// Applies a gesture. Returns the indices, among [`PlacedPoints::points`], of the points that it moved; later
+    /// gestures may move them further.
     ///
     /// A gesture places at most one point in a cell, and does not move a point that shares its cell with a hard anchor.
     pub fn apply(&mut self, gesture: &Gesture) -> Vec<usize> {
@@ -125,7 +127,8 @@ impl<'a> PlacedPoints<'a> {
         index
     }
 
-    /// Moves the cloth at a goal's uv to its position: the point placed in that cell, or a new one. `None` where a hard anchor holds the cell.
+    /// Moves the cloth at a goal's uv to its position: the point placed in that cell, or a new one. `None` where a hard
+    /// anchor holds the cell.
     fn place(&mut self, goal: &Goal) -> Option<usize> {
         match self.in_cell_of(goal.uv) {
             Some(index) if self.points[index].firmness == Firmness::Hard => None,
@@ -182,8 +185,8 @@ impl<'a> PlacedPoints<'a> {
 
     /// Moves the two ends together and raises the middle by as much as cloth of that length has to rise.
     ///
-    /// Cloth of length l over a distance d is a roof of height ½ √(l² − d²). The fold goes to the side to which the cloth bulges already;
-    /// flat cloth folds along its normal.
+    /// Cloth of length l over a distance d is a roof of height ½ √(l² − d²). The fold goes to the side to which the
+    /// cloth bulges already; flat cloth folds along its normal.
     fn pinch(&self, uvs: [Vec2; 2], amount: f64) -> Vec<Goal> {
         let [a, b] = uvs.map(|uv| self.at(uv));
         let between = b - a;

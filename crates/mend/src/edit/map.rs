@@ -1,4 +1,5 @@
-//! The map of an anchor search as a picture: for each cell how far the cloth stays from the target, and the path of the search.
+//! The map of an anchor search as a picture: for each cell how far the cloth stays from the target, and the path of the
+//! search.
 
 use image::{ImageFormat, Rgb, RgbImage};
 
@@ -52,10 +53,11 @@ struct DistanceRange {
     high: f64,
 }
 
-/// Draws the map: `losses[cell]` for each of the 64 × 64 cells, `None` outside the hole; the path on top, with a disk at its end.
+/// Draws the map: `losses[cell]` for each of the 64 × 64 cells, `None` outside the hole; the path on top, with a disk
+/// at its end.
 ///
-/// A colour is the distance in cells (the root of the loss), bright where it is small, from the least to the largest; the legend names both
-/// ends and the middle. Short strokes point downhill. u runs right, v up.
+/// A colour is the distance in cells (the root of the loss), bright where it is small, from the least to the largest;
+/// the legend names both ends and the middle. Short strokes point downhill. u runs right, v up.
 pub fn picture(losses: &[Option<CellLoss>], path: &[PathCell]) -> RgbImage {
     let side = SIDE as i32 * CELL;
     let size = [side + 2 * MARGIN + LEGEND, side + 2 * MARGIN].map(|s| s as u32);

@@ -1,19 +1,20 @@
-//! How far cloth reaches: the distance of two of its points in space is at most their distance on the chart, and a little more.
-//! Targets move to the nearest positions that obey this, by Dykstra's projections (Boyle & Dykstra 1986).
+//! How far cloth reaches: the distance of two of its points in space is at most their distance on the chart, and a
+//! little more. Targets move to the nearest positions that obey this, by Dykstra's projections (Boyle & Dykstra 1986).
 
 use super::point::PlacedPoint;
 use darn_geometry::mesh::{Vec2, Vec3};
 use darn_geometry::patch::Firmness;
 
-/// Share by which cloth may be longer than on the chart before a target counts as out of reach: more than woven cloth gives, so that an
-/// edit has an effect, and less than the stretch that a patch allows an edge.
+/// Share by which cloth may be longer than on the chart before a target counts as out of reach: more than woven cloth
+/// gives, so that an edit has an effect, and less than the stretch that a patch allows an edge.
 const GIVE: f64 = 0.22;
 /// Most rim vertices that are used; the limits of the vertices between them differ by less than an edge.
 const MAX_RIM: usize = 128;
-/// Up to this many points every pair is kept within its length; of more points each is paired with those placed just before it.
+/// Up to this many points every pair is kept within its length; of more points each is paired with those placed just
+/// before it.
 const ALL_PAIRS: usize = 48;
-/// Targets farther from the cloth than this many extents of the hole are moved to that distance along the same line: from much farther away
-/// the projections take hundreds of rounds, and the nearest point hardly differs.
+/// Targets farther from the cloth than this many extents of the hole are moved to that distance along the same line:
+/// from much farther away the projections take hundreds of rounds, and the nearest point hardly differs.
 const FAR: f64 = 1.5;
 /// Most rounds of projections.
 const MAX_ROUNDS: usize = 200;
@@ -71,10 +72,11 @@ impl ReachLimit {
         }
     }
 
-    /// The positions nearest to the points' targets, taken together, that cloth held at the rim can have; one for each point.
+    /// The positions nearest to the points' targets, taken together, that cloth held at the rim can have; one for each
+    /// point.
     ///
-    /// The limit is the straight distance on the chart. Where that line leaves hole and region the cloth's own way is longer, and the limit
-    /// is a little too strict. Targets within reach come back as they are.
+    /// The limit is the straight distance on the chart. Where that line leaves hole and region the cloth's own way is
+    /// longer, and the limit is a little too strict. Targets within reach come back as they are.
     pub fn nearest(&self, points: &[PlacedPoint]) -> Vec<Vec3> {
         let mut bounds = self.bounds(points);
         let extent = self.extent();
@@ -98,7 +100,8 @@ impl ReachLimit {
                 break;
             }
         }
-        // What the rounds left outside a ball moves straight towards the unedited cloth, which lies in all balls; they are convex.
+        // What the rounds left outside a ball moves straight towards the unedited cloth, which lies in all balls; they
+        // are convex.
         for bound in &bounds {
             if let Bound::Ball { of, ball, .. } = bound {
                 at[*of] = ball.clipped(points[*of].origin, at[*of]);
@@ -155,8 +158,8 @@ impl ReachLimit {
     }
 }
 
-/// The longest distance between two points in space, from their difference on the chart and on the unedited cloth: the distance on the chart
-/// and what cloth gives, or the present distance where that is longer.
+/// The longest distance between two points in space, from their difference on the chart and on the unedited cloth: the
+/// distance on the chart and what cloth gives, or the present distance where that is longer.
 fn length(flat: Vec2, present: Vec3) -> f64 {
     (flat.norm() * (1.0 + GIVE)).max(present.norm())
 }

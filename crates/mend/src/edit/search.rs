@@ -1,5 +1,6 @@
-//! The anchor search: at which cell of the hole an anchor brings the cloth nearest to a target (paper §3.5).
-//! Several descents go from cell to cell along the loss's gradient, side by side, so that the network is always asked in batches.
+//! The anchor search: at which cell of the hole an anchor brings the cloth nearest to a target (paper §3.5). Several
+//! descents go from cell to cell along the loss's gradient, side by side, so that the network is always asked in
+//! batches.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -82,9 +83,9 @@ pub struct PathCell {
     pub at: CellLoss,
 }
 
-/// Descends from the best of the seeds along the negative gradient, from cell to cell. A step is halved, down to one cell, until it lowers
-/// the loss; at last the best descent goes to neighbouring cells as long as one of them is lower. Every step lowers the loss, so no descent
-/// comes to a cell twice.
+/// Descends from the best of the seeds along the negative gradient, from cell to cell. A step is halved, down to one
+/// cell, until it lowers the loss; at last the best descent goes to neighbouring cells as long as one of them is lower.
+/// Every step lowers the loss, so no descent comes to a cell twice.
 ///
 /// All step lengths of all descents are tried in one batch. `None` when no seed lies in the hole.
 ///
@@ -158,7 +159,8 @@ pub fn search_every_cell<F: LossField>(
     Ok(Some(known.outcome(cell, &[cell])))
 }
 
-/// Where descents may start: the given cell, then cells of the hole as far from it and from each other as possible; `count` in all.
+/// Where descents may start: the given cell, then cells of the hole as far from it and from each other as possible;
+/// `count` in all.
 pub fn seeds(hole: &HoleCells, first: usize, count: usize) -> Vec<usize> {
     let centres: Vec<Vec2> = hole.indices().iter().map(|k| cell_centre(*k)).collect();
     let spread = farthest_first(&centres, &[cell_centre(first)], count.saturating_sub(1));
@@ -166,8 +168,8 @@ pub fn seeds(hole: &HoleCells, first: usize, count: usize) -> Vec<usize> {
     std::iter::once(first).chain(spread).collect()
 }
 
-/// Indices of up to `most` of the points, each the farthest from `taken` and the ones before it (Gonzalez 1985). The first point comes first
-/// if none is taken.
+/// Indices of up to `most` of the points, each the farthest from `taken` and the ones before it (Gonzalez 1985). The
+/// first point comes first if none is taken.
 pub fn farthest_first(points: &[Vec2], taken: &[Vec2], most: usize) -> Vec<usize> {
     if points.len() <= most {
         return (0..points.len()).collect();
@@ -236,7 +238,8 @@ impl Descent {
         self.path.push(cell);
     }
 
-    /// The steps downhill of the stride's length, half of it, … one cell; none when the descent has ended or the gradient is zero.
+    /// The steps downhill of the stride's length, half of it, … one cell; none when the descent has ended or the
+    /// gradient is zero.
     fn steps<F: LossField>(&self, known: &KnownLosses<F>, hole: &HoleCells) -> Vec<DownhillStep> {
         let Some(here) = known.gradient(self.cell).filter(|_| self.stride > 0.0) else {
             return Vec::new();
@@ -272,7 +275,8 @@ impl Descent {
     }
 }
 
-/// The cell that a step from a cell's centre ends in, at least one cell away along the longer axis; `None` outside the grid.
+/// The cell that a step from a cell's centre ends in, at least one cell away along the longer axis; `None` outside the
+/// grid.
 fn moved(cell: usize, by: Vec2) -> Option<usize> {
     let longest = by.amax().max(f64::MIN_POSITIVE);
     let by = if longest < 1.0 { by / longest } else { by };
