@@ -1,4 +1,4 @@
-//! Normals of a grid of positions.
+//! Neighbours and normals of the cells of a grid of positions.
 
 use darn_geometry::grid::SIDE;
 use darn_geometry::mesh::Vec3;

@@ -118,20 +118,20 @@ impl LineChart {
             draw_line(line, &across, &up, text);
         }
         let middle = 0.5 * (LEFT + right);
-        write_text(text, Anchor::Middle, middle, 26.0, &self.title);
+        write_text(text, TextAnchor::Middle, middle, 26.0, &self.title);
         let below = f64::from(size.height) - 16.0;
-        write_text(text, Anchor::Middle, middle, below, &self.x.label);
+        write_text(text, TextAnchor::Middle, middle, below, &self.x.label);
         let _ = write!(
             text,
             "<g transform=\"translate(22 {}) rotate(-90)\">",
             pixel(0.5 * (TOP + bottom))
         );
-        write_text(text, Anchor::Middle, 0.0, 0.0, &self.y.label);
+        write_text(text, TextAnchor::Middle, 0.0, 0.0, &self.y.label);
         text.push_str("</g>\n");
         let named = self.lines.iter().filter(|line| !line.name.is_empty());
         for (line, row) in named.zip(0u32..) {
             let y = TOP + 20.0 + 20.0 * f64::from(row);
-            write_text(text, Anchor::End, right - 48.0, y, &line.name);
+            write_text(text, TextAnchor::End, right - 48.0, y, &line.name);
             let ink = colour(line.ink);
             let _ = writeln!(
                 text,
@@ -155,7 +155,7 @@ fn draw_grid(across: &Ruler, up: &Ruler, text: &mut String) {
             "<path d=\"M{} {bottom}V{top}\" stroke=\"{RULE}\"/>",
             pixel(at)
         );
-        write_text(text, Anchor::Middle, at, up.first + 20.0, &short(x));
+        write_text(text, TextAnchor::Middle, at, up.first + 20.0, &short(x));
     }
     for y in up.ticks() {
         let Some(at) = up.pixel(y) else { continue };
@@ -164,7 +164,13 @@ fn draw_grid(across: &Ruler, up: &Ruler, text: &mut String) {
             "<path d=\"M{left} {}H{right}\" stroke=\"{RULE}\"/>",
             pixel(at)
         );
-        write_text(text, Anchor::End, across.first - 8.0, at + 5.0, &short(y));
+        write_text(
+            text,
+            TextAnchor::End,
+            across.first - 8.0,
+            at + 5.0,
+            &short(y),
+        );
     }
     let _ = writeln!(
         text,
@@ -193,15 +199,15 @@ fn draw_line(line: &ChartLine, across: &Ruler, up: &Ruler, text: &mut String) {
 
 /// Which end of a text its position is at.
 #[derive(Clone, Copy)]
-enum Anchor {
+enum TextAnchor {
     Middle,
     End,
 }
 
-fn write_text(text: &mut String, anchor: Anchor, x: f64, y: f64, words: &str) {
+fn write_text(text: &mut String, anchor: TextAnchor, x: f64, y: f64, words: &str) {
     let anchor = match anchor {
-        Anchor::Middle => "middle",
-        Anchor::End => "end",
+        TextAnchor::Middle => "middle",
+        TextAnchor::End => "end",
     };
     let _ = writeln!(
         text,

@@ -1,5 +1,5 @@
 //! The loss of [`super::loss`] and its derivatives with respect to a prediction, written out on plain slices, for the engine's trainer. A
-//! test holds both against burn's autodiff. No locks are taken, so it may run on the threads of a pool.
+//! test compares both with burn's autodiff. No locks are taken, so it may run on the threads of a pool.
 
 use super::batch::TrainingBatch;
 use super::loss::{DATA_BEND, GRADIENT_BEND, LENGTH_GUARD, LossKind, LossTerms, LossWeights};

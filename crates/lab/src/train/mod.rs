@@ -4,8 +4,8 @@
 //! Sheets come from [`scarffolds`]; nothing here simulates cloth or is reached by a request.
 //!
 //! The loss is written three times. `loss` has it in burn: the definition, whose gradient is autodiff's. `loss_gradient` has it with
-//! derivatives written out, for the engine's trainer; a test holds it against `loss`. `scripts/gpu/loss.py` has it in PyTorch, which trained the
-//! weights that ship; `scripts/gpu/check.py` holds it against this crate.
+//! derivatives written out, for the engine's trainer; a test compares it with `loss`. `scripts/gpu/loss.py` has it in PyTorch, which trained the
+//! weights that ship; `scripts/gpu/check.py` compares it with this program.
 
 pub mod batch;
 mod burn_trainer;

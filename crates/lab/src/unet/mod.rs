@@ -6,9 +6,9 @@
 //! | where | what for |
 //! |---|---|
 //! | here, in burn | the definition: it names the tensors of weights files, trains from random weights, and runs as `--backend flex` or `ndarray` |
-//! | `darn_net::engine` | the product: hand-written kernels; tests hold its predictions and gradients against burn and against f64 |
-//! | `darn_net::reference`, f64 | precise enough for finite differences, so it proves gradients, which two f32 programs cannot do for each other |
-//! | `scripts/gpu/network.py`, PyTorch | trained the weights that ship; `scripts/gpu/check.py` holds it against this program |
+//! | `darn_net::engine` | the product: hand-written kernels; tests compare its predictions and gradients with burn and with f64 |
+//! | `darn_net::reference`, f64 | precise enough for finite differences, so it proves gradients, which two programs in f32 cannot |
+//! | `scripts/gpu/network.py`, PyTorch | trained the weights that ship; `scripts/gpu/check.py` compares it with this program |
 
 use burn::module::Module;
 use burn::tensor::Tensor;
