@@ -11,7 +11,9 @@ use super::slopes::slopes;
 use super::student::{Learned, Snapshot, Student};
 use super::{TrainError, TrainOptions};
 use darn_geometry::grid::CELLS;
-use darn_net::engine::{Engine, EngineError, EngineOptions, Input, Lessons, Scratch};
+use darn_net::engine::{
+    Engine, EngineError, EngineInput, EngineOptions, Scratch, WeightGradientBuffers,
+};
 use darn_net::weights::NamedTensors;
 use darn_net::{UnetConfig, cells};
 
@@ -24,7 +26,7 @@ pub struct Engined {
     /// By trained tensor, in the order of their names.
     moments: Vec<[Vec<f32>; 2]>,
     step: u64,
-    lessons: Lessons,
+    lessons: WeightGradientBuffers,
 }
 
 impl Engined {
@@ -36,8 +38,8 @@ impl Engined {
         Engine::new(tensors, &self.config, options)
     }
 
-    fn input<'a>(&self, batch: &'a Batch) -> Input<'a> {
-        Input {
+    fn input<'a>(&self, batch: &'a Batch) -> EngineInput<'a> {
+        EngineInput {
             positions: &batch.positions,
             known: &batch.known,
             base: Some(&batch.base),
@@ -113,7 +115,7 @@ impl Student for Engined {
             averaged: snapshot.averaged,
             moments: snapshot.moments,
             step: snapshot.step,
-            lessons: Lessons::default(),
+            lessons: WeightGradientBuffers::default(),
         })
     }
 
@@ -133,7 +135,7 @@ impl Student for Engined {
             said.map(|term| term * share)
         };
         let lessons = &mut self.lessons;
-        let (gradient, said) = engine.learn(lessons, &self.network, input, &lesson)?;
+        let (gradient, said) = engine.weight_gradients(lessons, &self.network, input, &lesson)?;
         let sum = |term: usize| said.iter().map(|terms| terms[term]).sum();
         let terms = std::array::from_fn(sum);
         let norm = self.descend(&gradient, rate);

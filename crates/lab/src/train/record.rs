@@ -10,7 +10,7 @@
 use super::batch::{Batch, Prepared};
 use darn_geometry::grid::CELLS;
 use darn_net::InputKind;
-use darn_net::engine::{Input, seen};
+use darn_net::engine::{EngineInput, input_positions};
 
 /// Bytes of one record.
 pub const RECORD: usize = 2 * 3 * CELLS * 4 + 3 * 4 + CELLS;
@@ -19,13 +19,13 @@ pub const RECORD: usize = 2 * 3 * CELLS * 4 + 3 * 4 + CELLS;
 pub fn write(samples: &[Prepared], records: &mut Vec<u8>) {
     for sample in samples {
         let batch = Batch::of(std::slice::from_ref(sample));
-        let grid = Input {
+        let grid = EngineInput {
             positions: &batch.positions,
             known: &batch.known,
             base: Some(&batch.base),
             up: None,
         };
-        let seen = seen(InputKind::Plate, grid);
+        let seen = input_positions(InputKind::Plate, grid);
         let numbers = seen.iter().chain(&batch.truth).chain(&batch.up);
         records.extend(numbers.flat_map(|x| x.to_le_bytes()));
         let flags = |k: usize| {
