@@ -1,12 +1,26 @@
 # syntax=docker/dockerfile:1
 
-# --- build: everything the binary is made of, and nothing of the tests
+# --- dependencies: a layer of their own, rebuilt only when a manifest or the lock file changes
 FROM rust:1.95.0-slim-bookworm AS build
 WORKDIR /src
-COPY Cargo.toml Cargo.lock build.rs ./
+COPY Cargo.toml Cargo.lock rust-toolchain.toml ./
+COPY crates/contract/Cargo.toml crates/contract/
+COPY crates/geometry/Cargo.toml crates/geometry/
+COPY crates/gltf-scan/Cargo.toml crates/gltf-scan/
+COPY crates/json/Cargo.toml crates/json/
+COPY crates/lab/Cargo.toml crates/lab/
+COPY crates/mend/Cargo.toml crates/mend/
+COPY crates/net/Cargo.toml crates/net/
+COPY crates/render/Cargo.toml crates/render/
+COPY crates/serve/Cargo.toml crates/serve/
+COPY scripts/stub-sources scripts/
+RUN scripts/stub-sources && cargo build --release --locked --bin darn && cargo clean --release --workspace
+
+# --- build: everything the binary is made of, and nothing of the tests
 COPY proto proto
 COPY weights weights
 COPY examples examples
+COPY crates crates
 COPY src src
 RUN cargo build --release --locked --bin darn
 

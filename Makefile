@@ -1,4 +1,4 @@
-# Everything a person or CI does with darn. One cargo profile (release) throughout: burn is optimised once.
+# Everything a person or CI does with darn. One cargo profile (release) throughout: dependencies are compiled once.
 .DEFAULT_GOAL := help
 SHELL := bash
 
@@ -23,19 +23,20 @@ run: ## Set up, build, serve on DARN_LISTEN, mend the example through HTTP, go o
 
 test: ## Set up and run all tests
 	@scripts/setup
-	$(CARGO) test --release --locked
 	$(CARGO) build --release --locked
+	$(CARGO) test --release --locked --workspace --lib --bins --tests
+	$(CARGO) test --release --locked --workspace --doc
 	@scripts/validate
 
 lint: ## Check formatting and lints, warnings are errors
 	$(CARGO) fmt --check
-	$(CARGO) clippy --release --locked --all-targets -- -D warnings
+	$(CARGO) clippy --release --locked --workspace --all-targets -- -D warnings
 
 fmt: ## Format the code
 	$(CARGO) fmt
 
-docs: ## Build the library's documentation, warnings are errors
-	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --no-deps --lib
+docs: ## Build the crates' documentation, warnings are errors
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --workspace --no-deps
 
 clean: ## Remove what was built
 	$(CARGO) clean

@@ -1,4 +1,4 @@
-//! What a mend spends its time on, piece by piece, on the example scan: `cargo bench --bench kernels [-- FILTER]`.
+//! Times the stages of a mend on the example scan: `cargo bench --bench kernels [-- FILTER]`.
 
 use std::hint::black_box;
 
@@ -8,14 +8,13 @@ use darn_geometry::grid::{CELLS, Grid};
 use darn_geometry::mesh::loops::{LoopKind, boundary_loops};
 use darn_geometry::mesh::region::{Region, grow};
 use darn_geometry::mesh::weld::weld;
-use darn_geometry::mesh::{TriMesh, Vec3};
-use darn_geometry::patch;
-use darn_geometry::patch::{Firmness, Pull};
+use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
+use darn_geometry::patch::{self, Firmness, PatchOptions, Pull};
 use darn_gltf_scan::Scan;
 use darn_net::engine::{Engine, EngineInput, EngineOptions, InputGradient, Isa, Scratch};
 use darn_net::weights;
 
-/// The hole of the example scan: its cloth, the cloth laid flat, and that sampled.
+/// The hole of the example scan with the region around it, its chart and its grid.
 struct Hole {
     surface: TriMesh,
     region: Region,
@@ -23,17 +22,17 @@ struct Hole {
     grid: Grid,
 }
 
-/// Reach of the region, in scene units; the example's hole is a third of a unit wide.
+/// Reach of the region, scene units; the example's hole is a third of a unit wide.
 const REACH: f64 = 0.25;
 
 fn hole() -> Hole {
     let bytes = std::fs::read("examples/scarf_hole.glb").expect("run in the repository's root");
-    let scan = Scan::read(&bytes, &Default::default()).expect("the example is a scan");
+    let scan = Scan::read(bytes, &Default::default()).expect("the example is a scan");
     let welded = weld(&scan.surface);
     let topology = welded.topology();
     let loops = boundary_loops(&welded.mesh, &topology);
-    let place = loops.iter().position(|l| l.kind == LoopKind::Hole);
-    let rim = place.expect("the example has a hole");
+    let rim = loops.iter().find(|l| l.kind == LoopKind::Hole);
+    let rim = rim.expect("the example has a hole").id;
     let region = grow(&welded.mesh, &topology, &loops, rim, REACH).expect("it is a disk");
     let chart = flatten::flatten(&region, &Default::default()).expect("it lies flat");
     let grid = flatten::raster(&region.mesh, &chart);
@@ -56,9 +55,9 @@ fn mesh(c: &mut Criterion) {
     });
 }
 
-fn cloth(c: &mut Criterion) {
+fn patches(c: &mut Criterion) {
     let hole = hole();
-    let options = patch::PatchOptions::default();
+    let options = PatchOptions::default();
     let normal = hole.grid.normalisation().expect("cells are known");
     let positions = hole.grid.normalised(&normal).positions;
     let known = &hole.grid.known;
@@ -69,22 +68,22 @@ fn cloth(c: &mut Criterion) {
     let filled: Vec<Vec3> = (hole.grid.positions.iter().zip(known).zip(&plate))
         .map(|((own, known), q)| if *known { *own } else { normal.to_scene(q) })
         .collect();
-    let planned = || patch::plan(&hole.region, &hole.chart, &options);
-    c.bench_function("patch, plan", |b| b.iter(planned));
-    let plan = planned().expect("a plan");
-    let made = |pulls: &[Pull]| {
+    let plan = || patch::plan(&hole.region, &hole.chart, &options);
+    c.bench_function("patch, plan", |b| b.iter(plan));
+    let plan = plan().expect("a plan");
+    let patch = |pulls: &[Pull]| {
         plan.patch(&hole.chart, &filled, pulls, &options)
             .expect("a patch")
     };
-    c.bench_function("patch, unedited", |b| b.iter(|| made(&[])));
-    let free = made(&[]);
-    let middle = free.flat.iter().sum::<darn_geometry::mesh::Vec2>() / free.flat.len() as f64;
+    c.bench_function("patch, unedited", |b| b.iter(|| patch(&[])));
+    let unpulled = patch(&[]);
+    let middle = unpulled.flat.iter().sum::<Vec2>() / unpulled.flat.len() as f64;
     let pull = Pull {
         at: middle,
-        to: free.at(middle) + Vec3::new(0.0, 0.02, 0.0),
-        hold: Firmness::Soft,
+        to: unpulled.at(middle) + Vec3::new(0.0, 0.02, 0.0),
+        firmness: Firmness::Soft,
     };
-    c.bench_function("patch, one pull", |b| b.iter(|| made(&[pull])));
+    c.bench_function("patch, one pull", |b| b.iter(|| patch(&[pull])));
 }
 
 fn network(c: &mut Criterion) {
@@ -131,5 +130,5 @@ fn network(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, mesh, cloth, network);
+criterion_group!(benches, mesh, patches, network);
 criterion_main!(benches);

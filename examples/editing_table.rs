@@ -13,10 +13,10 @@ use darn_contract::{Anchor, Constraints, Edit, Gesture, Search};
 use darn_geometry::mesh::curvature::vertex_normals;
 use darn_geometry::mesh::{Vec2, Vec3};
 use darn_gltf_scan::Scan;
-use darn_gltf_scan::export::{Fresh, glb};
-use darn_lab::scarffolds::scanned::{Hole, scanned};
+use darn_gltf_scan::export::{NewMesh, glb};
+use darn_lab::scarffolds::holed_scan::{HoleShape, holed_scan};
 use darn_lab::scarffolds::sheets;
-use darn_lab::scarffolds::sheets::Sheet;
+use darn_lab::scarffolds::sheets::SimulatedSheet;
 use darn_mend::{MendLimits, NetworkMender, Response, ScanSession};
 use darn_net::engine::EngineOptions;
 use darn_net::{Network, Networks};
@@ -40,7 +40,7 @@ struct Args {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let args = Args::parse();
-    let standard = Network::load(&std::fs::read(&args.weights)?, Options::default())?;
+    let standard = Network::load(&std::fs::read(&args.weights)?, EngineOptions::default())?;
     let mender = Arc::new(NetworkMender {
         limits: MendLimits {
             response: match args.response.as_str() {
@@ -70,13 +70,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-fn hole(k: usize, rng: &mut ChaCha8Rng) -> Hole {
+fn hole(k: usize, rng: &mut ChaCha8Rng) -> HoleShape {
     let centre = Vec2::new(rng.random_range(0.42..0.58), rng.random_range(0.42..0.58));
     let radius = rng.random_range(0.09..0.17);
     match k % 3 {
-        0 => Hole::Circle { centre, radius },
-        1 => Hole::Blob { centre, radius },
-        _ => Hole::Slit {
+        0 => HoleShape::Circle { centre, radius },
+        1 => HoleShape::Blob { centre, radius },
+        _ => HoleShape::Slit {
             centre,
             length: 1.5 * radius,
             width: 0.45 * radius,
@@ -114,25 +114,25 @@ struct Row {
 
 impl Case {
     fn open(
-        sheet: &Sheet,
-        hole: &Hole,
+        sheet: &SimulatedSheet,
+        hole: &HoleShape,
         mender: &Arc<NetworkMender>,
         rng: &mut ChaCha8Rng,
     ) -> Option<Case> {
-        let mesh = scanned(sheet, 45, hole, rng).mesh;
+        let mesh = holed_scan(sheet, 45, hole, rng).mesh;
         let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| p.cast().into()).collect();
         let normals: Vec<[f32; 3]> = vertex_normals(&mesh)
             .iter()
             .map(|n| n.cast().into())
             .collect();
-        let fresh = Fresh {
+        let fresh = NewMesh {
             name: "sheet",
             positions: &positions,
             normals: &normals,
             texcoords: &[],
             faces: &mesh.faces,
         };
-        let scan = Scan::read(&glb(&fresh).ok()?, &darn_gltf_scan::ScanLimits::default()).ok()?;
+        let scan = Scan::read(glb(&fresh).ok()?, &darn_gltf_scan::ScanLimits::default()).ok()?;
         let started = Instant::now();
         let session = ScanSession::open(
             scan,

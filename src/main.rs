@@ -1,4 +1,4 @@
-//! The `darn` binary: one command line over the library.
+//! The `darn` binary: the command line.
 
 #![forbid(unsafe_code)]
 

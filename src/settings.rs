@@ -1,4 +1,4 @@
-//! Settings of commands: which weights, what computes, and what a scan may cost. The service's own are in `darn-serve`.
+//! Settings that several commands share, and those of `darn serve` beside the service's own in `darn-serve`.
 
 use std::path::PathBuf;
 
@@ -9,7 +9,7 @@ use darn_serve::ServeArgs;
 /// Serve HTTP and gRPC.
 #[derive(Debug, Clone, Args)]
 pub struct ServeCommand {
-    /// What the service itself reads.
+    /// The service's own settings.
     #[command(flatten)]
     pub serve: ServeArgs,
 
@@ -31,7 +31,7 @@ pub struct ServeCommand {
 }
 
 impl ServeCommand {
-    /// What a scan may cost.
+    /// The limits of a scan's size.
     pub fn scan_limits(&self) -> ScanLimits {
         ScanLimits {
             max_faces: self.max_faces,
@@ -41,7 +41,7 @@ impl ServeCommand {
     }
 }
 
-/// Which weights, and what computes with them.
+/// The weights, and the backend that computes with them.
 #[derive(Debug, Clone, Args)]
 pub struct NetworkArgs {
     /// Directory or file of the weights; left out, the shipped ones

@@ -38,7 +38,7 @@ impl Service {
                     .ok()
             })
             .expect("the log names the address");
-        // Whoever reads no more blocks the writer.
+        // The service blocks on a full pipe unless its log is read.
         std::thread::spawn(move || lines.for_each(drop));
         Service { child, address }
     }
@@ -56,7 +56,7 @@ impl Drop for Service {
 }
 
 #[tokio::test]
-async fn the_service_answers_as_the_command_does_and_stops_when_told() {
+async fn the_service_and_the_command_give_the_same_bytes_and_sigterm_ends_it() {
     let mut service = Service::start();
     let client = reqwest::Client::new();
     for _ in 0..600 {
@@ -125,7 +125,7 @@ async fn the_service_answers_as_the_command_does_and_stops_when_told() {
 }
 
 #[test]
-fn wrong_usage_is_64_and_a_broken_scan_is_1_with_one_line_that_says_why() {
+fn wrong_usage_exits_with_64_and_an_unreadable_scan_with_1() {
     let usage = darn().args(["inpaint"]).output().expect("darn runs");
     assert_eq!(usage.status.code(), Some(64));
     let missing = darn()
@@ -138,7 +138,7 @@ fn wrong_usage_is_64_and_a_broken_scan_is_1_with_one_line_that_says_why() {
 }
 
 #[test]
-fn samples_are_records_of_bytes_the_same_for_the_same_seed() {
+fn samples_are_fixed_size_records_that_depend_on_the_seed_alone() {
     let folder = tempfile::tempdir().expect("a folder");
     let sheets = folder.path().to_str().expect("a name");
     let made = darn()
@@ -153,7 +153,7 @@ fn samples_are_records_of_bytes_the_same_for_the_same_seed() {
         found.expect("darn runs").stdout
     };
     let first = samples("4");
-    // Two grids of 3 × 4096 numbers, where up is, a byte of flags a cell.
+    // A record: two grids of 3 × 4096 f32, the up direction as 3 f32, one byte of flags per cell.
     assert_eq!(first.len(), 3 * ((2 * 3 * 4096 + 3) * 4 + 4096));
     assert!(first == samples("4") && first != samples("5"));
     let missing = darn().args(["samples", "--sheets", "/nowhere"]).output();

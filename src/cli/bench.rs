@@ -1,4 +1,5 @@
-//! `darn bench`: how long the network and a mend take on this machine; engines in turn, so that a busy moment hits all of them.
+//! `darn bench`: how long the network and a mend take on this machine. The engines take turns, so that a busy moment
+//! slows all of them.
 
 use super::failure::{Failure, OrFail};
 use super::files;
@@ -16,21 +17,21 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct BenchArgs {
     #[command(subcommand)]
-    what: What,
+    command: BenchCommand,
 }
 
 #[derive(Debug, clap::Subcommand)]
-enum What {
+enum BenchCommand {
     /// Forward passes and input gradients: the engine on every instruction set of this CPU, and burn's backends
-    Net(NetArgs),
+    Net(BenchNetArgs),
     /// A whole mend, stage by stage
-    Mend(MendArgs),
+    Mend(BenchMendArgs),
 }
 
 #[derive(Debug, clap::Args)]
-struct NetArgs {
+struct BenchNetArgs {
     /// Weights file; left out, the shipped standard ones
     #[arg(long)]
     weights: Option<PathBuf>,
@@ -55,7 +56,7 @@ struct NetArgs {
 }
 
 #[derive(Debug, clap::Args)]
-struct MendArgs {
+struct BenchMendArgs {
     /// The scan
     scan: PathBuf,
     /// How often it is mended
@@ -65,25 +66,37 @@ struct MendArgs {
     network: NetworkArgs,
 }
 
-pub fn run(args: &Args) -> Result<(), Failure> {
-    match &args.what {
-        What::Net(args) => net(args),
-        What::Mend(args) => mend(args),
+pub fn run(args: &BenchArgs) -> Result<(), Failure> {
+    match &args.command {
+        BenchCommand::Net(args) => net(args),
+        BenchCommand::Mend(args) => mend(args),
     }
 }
 
-/// One way to compute, and how long it took.
-struct Row<'a> {
+/// A pass of an engine, and how long its calls took.
+struct BenchRow<'a> {
     engine: String,
     what: &'static str,
-    batch: usize,
-    threads: usize,
-    call: Call<'a>,
+    size: PassSize,
+    call: TimedCall<'a>,
     milliseconds: Vec<f64>,
 }
 
-impl Row<'_> {
-    /// Calls for at least `turn`, at least twice.
+/// How many grids a pass has, and how many threads share it.
+#[derive(Debug, Clone, Copy)]
+struct PassSize {
+    batch: usize,
+    threads: usize,
+}
+
+/// The calls of an engine that are timed.
+struct Passes<'a> {
+    forward: TimedCall<'a>,
+    gradient: TimedCall<'a>,
+}
+
+impl BenchRow<'_> {
+    /// Calls until `turn` has passed, and at least twice.
     fn take_turn(&mut self, turn: Duration) -> Result<(), NetError> {
         let started = Instant::now();
         let mut calls = 0;
@@ -97,7 +110,7 @@ impl Row<'_> {
     }
 }
 
-fn net(args: &NetArgs) -> Result<(), Failure> {
+fn net(args: &BenchNetArgs) -> Result<(), Failure> {
     let bytes = match &args.weights {
         Some(path) => files::read(path)?,
         None => super::network::standard().to_vec(),
@@ -133,14 +146,24 @@ fn net(args: &NetArgs) -> Result<(), Failure> {
         for (threads, engine) in &engines {
             let pool = pools.iter().find(|(t, _)| t == threads);
             let Some((_, pool)) = pool else { continue };
-            rows.extend(own(engine, pool, *batch, *threads));
+            let size = PassSize {
+                batch: *batch,
+                threads: *threads,
+            };
+            let name = format!("engine {}", engine.isa().name());
+            rows.extend(bench_rows(&name, size, engine_passes(engine, pool, *batch)));
         }
         for (name, network) in &networks {
             for (threads, pool) in &pools {
-                let rows_of_burn = burns((name, network), pool, *batch, *threads);
-                // burn-ndarray's gradient takes seconds a grid: it is left out.
-                let bearable = |row: &Row| *name != "ndarray" || row.what == "forward";
-                rows.extend(rows_of_burn.into_iter().filter(bearable));
+                let size = PassSize {
+                    batch: *batch,
+                    threads: *threads,
+                };
+                let passes = network_passes(network, pool, *batch);
+                let rows_of_burn = bench_rows(&format!("burn {name}"), size, passes);
+                // burn-ndarray's gradient takes seconds for each grid, so it is left out.
+                let fast_enough = |row: &BenchRow| *name != "ndarray" || row.what == "forward";
+                rows.extend(rows_of_burn.into_iter().filter(fast_enough));
             }
         }
     }
@@ -150,7 +173,11 @@ fn net(args: &NetArgs) -> Result<(), Failure> {
             took.or_fail(format!("run {}", row.engine))?;
         }
     }
-    print(&mut rows, &config, args.json);
+    if args.json {
+        print_json(&mut rows);
+    } else {
+        print_table(&mut rows, &config);
+    }
     Ok(())
 }
 
@@ -170,7 +197,7 @@ fn burn_networks(bytes: &[u8]) -> Result<Vec<(&'static str, Network)>, Failure> 
     .collect()
 }
 
-/// A build without burn has none of its backends.
+/// A build without burn has no backends of burn.
 #[cfg(not(feature = "burn"))]
 fn burn_networks(_: &[u8]) -> Result<Vec<(&'static str, Network)>, Failure> {
     Ok(Vec::new())
@@ -191,12 +218,8 @@ fn grid(number: usize) -> NormalGrid {
     }
 }
 
-fn own<'a>(
-    engine: &'a Engine,
-    pool: &'a rayon::ThreadPool,
-    batch: usize,
-    threads: usize,
-) -> [Row<'a>; 2] {
+/// The passes of the engine on `batch` grids.
+fn engine_passes<'a>(engine: &'a Engine, pool: &'a rayon::ThreadPool, batch: usize) -> Passes<'a> {
     let planes: Vec<f32> = (0..batch)
         .flat_map(|n| {
             let cells = grid(n).positions;
@@ -234,21 +257,18 @@ fn own<'a>(
             |_: usize, prediction: &[f32], by: &mut [f32]| by.copy_from_slice(prediction);
         Ok(pool.install(|| engine.gradient(&mut scratch, input, &cotangent, out))?)
     };
-    let name = format!("engine {}", engine.isa().name());
-    both(
-        &name,
-        [batch, threads],
-        Box::new(forward),
-        Box::new(gradient),
-    )
+    Passes {
+        forward: Box::new(forward),
+        gradient: Box::new(gradient),
+    }
 }
 
-fn burns<'a>(
-    (name, network): (&'a str, &'a Network),
+/// The passes of a network on `batch` grids.
+fn network_passes<'a>(
+    network: &'a Network,
     pool: &'a rayon::ThreadPool,
     batch: usize,
-    threads: usize,
-) -> [Row<'a>; 2] {
+) -> Passes<'a> {
     let grids: Vec<NormalGrid> = (0..batch).map(grid).collect();
     let forward = move || {
         let request = FillRequest {
@@ -264,63 +284,57 @@ fn burns<'a>(
         let found = pool.install(|| network.anchor_gradients(&problem, &uvs));
         found.map(drop)
     };
-    let name = format!("burn {name}");
-    both(
-        &name,
-        [batch, threads],
-        Box::new(forward),
-        Box::new(gradient),
-    )
+    Passes {
+        forward: Box::new(forward),
+        gradient: Box::new(gradient),
+    }
 }
 
-type Call<'a> = Box<dyn FnMut() -> Result<(), NetError> + 'a>;
+type TimedCall<'a> = Box<dyn FnMut() -> Result<(), NetError> + 'a>;
 
 /// The rows of an engine's two passes.
-fn both<'a>(
-    engine: &str,
-    [batch, threads]: [usize; 2],
-    forward: Call<'a>,
-    gradient: Call<'a>,
-) -> [Row<'a>; 2] {
-    [("forward", forward), ("gradient", gradient)].map(|(what, call)| Row {
+fn bench_rows<'a>(engine: &str, size: PassSize, passes: Passes<'a>) -> [BenchRow<'a>; 2] {
+    [("forward", passes.forward), ("gradient", passes.gradient)].map(|(what, call)| BenchRow {
         engine: engine.to_owned(),
         what,
-        batch,
-        threads,
+        size,
         call,
         milliseconds: Vec::new(),
     })
 }
 
-/// Multiply-adds of a forward pass count twice; the paper's network of width 64 has 9.15 GFLOP.
+/// GFLOP of a forward pass for one grid, a multiply-add counted as two; the paper's network of width 64 has 9.15.
 fn gigaflops(config: &UnetConfig) -> f64 {
     9.15 * (config.width as f64 / 64.0).powi(2)
 }
 
-fn print(rows: &mut [Row], config: &UnetConfig, as_json: bool) {
-    if !as_json {
-        println!(
-            "| engine | what | batch | threads | least ms | median ms | GFLOP/s |\n|---|---|---|---|---|---|---|"
-        );
-    }
+fn print_json(rows: &mut [BenchRow]) {
     for row in rows {
         let (least, median) = spread(&mut row.milliseconds);
         let (engine, isa) = row.engine.split_once(' ').unwrap_or((&row.engine, ""));
-        if as_json {
-            let line = json!({
-                "engine": engine, "isa": isa, "precision": "f32", "what": row.what, "batch": row.batch,
-                "threads": row.threads, "least_ms": least, "median_ms": median,
-            });
-            println!("{line}");
-            continue;
-        }
+        let PassSize { batch, threads } = row.size;
+        let line = json!({
+            "engine": engine, "isa": isa, "precision": "f32", "what": row.what, "batch": batch,
+            "threads": threads, "least_ms": least, "median_ms": median,
+        });
+        println!("{line}");
+    }
+}
+
+fn print_table(rows: &mut [BenchRow], config: &UnetConfig) {
+    println!(
+        "| engine | what | batch | threads | least ms | median ms | GFLOP/s |\n|---|---|---|---|---|---|---|"
+    );
+    for row in rows {
+        let (least, median) = spread(&mut row.milliseconds);
+        let PassSize { batch, threads } = row.size;
         let rate = match row.what {
-            "forward" => format!("{:.0}", gigaflops(config) * row.batch as f64 / median * 1e3),
+            "forward" => format!("{:.0}", gigaflops(config) * batch as f64 / median * 1e3),
             _ => String::new(),
         };
         println!(
-            "| {} | {} | {} | {} | {least:.2} | {median:.2} | {rate} |",
-            row.engine, row.what, row.batch, row.threads
+            "| {} | {} | {batch} | {threads} | {least:.2} | {median:.2} | {rate} |",
+            row.engine, row.what
         );
     }
 }
@@ -332,14 +346,15 @@ fn spread(numbers: &mut [f64]) -> (f64, f64) {
     (at(0), at(numbers.len() / 2))
 }
 
-fn mend(args: &MendArgs) -> Result<(), Failure> {
+fn mend(args: &BenchMendArgs) -> Result<(), Failure> {
     let name = args.scan.display();
     let bytes = files::read(&args.scan)?;
     let mender = mender(&args.network)?;
     let mut stages: Vec<(&str, Vec<f64>)> = Vec::new();
     for _ in 0..=args.times {
+        let bytes = bytes.clone();
         let started = Instant::now();
-        let scan = Scan::read(&bytes, &ScanLimits::default()).or_fail(format!("read {name}"))?;
+        let scan = Scan::read(bytes, &ScanLimits::default()).or_fail(format!("read {name}"))?;
         let read = started.elapsed();
         let mended = darn_mend::mend(&scan, &Constraints::default(), &mender);
         let mut mended = mended.or_fail(format!("mend {name}"))?;

@@ -1,20 +1,20 @@
-//! `darn evaluate`: what a network's fills are worth on held-out sheets, beside smooth fills and the truth.
+//! `darn evaluate`: measures a network's fills on held-out sheets, beside smooth fills and the truth.
 
 use super::failure::{Failure, OrFail};
 use super::files;
 use super::mended::mended;
 use super::network::mender;
-use super::progress::Progress;
+use super::progress::WorkProgress;
 use crate::settings::NetworkArgs;
 use darn_geometry::grid::NormalGrid;
 use darn_geometry::patch::PatchOptions;
-use darn_lab::evaluate::{self, Cut, EvaluateError, Plan, Report, ScanRow, Scanner, Shares};
-use darn_lab::scarffolds::samples::{Sampler, Turning};
-use darn_lab::scarffolds::sheets::{self, Sheet};
+use darn_lab::evaluate::{
+    self, EvaluateError, EvaluationPlan, GridShares, HoleKind, ScanRow, SyntheticScanOptions,
+};
+use darn_lab::scarffolds::samples::{SampleRotation, Sampler};
+use darn_lab::scarffolds::sheets::{self, SimulatedSheet};
 use darn_net::{Averaging, FillRequest};
-use image::ImageFormat;
 use serde_json::json;
-use std::io::Cursor;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -37,7 +37,7 @@ pub struct Args {
     /// Where every measurement goes, as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Where the curves go, as PNG
+    /// Where the curves go, as SVG
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
     /// Mend this many sheets end to end, too, each scanned with a round, a ragged and a long hole
@@ -62,8 +62,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if sheets.is_empty() || args.samples == 0 {
         return Err(Failure::Usage("there is nothing to measure".into()));
     }
-    let turning = Turning::keeping_up(args.upright);
-    let cases = evaluate::draw(&Sampler::new(&sheets, turning), args.samples, args.seed);
+    let rotation = match args.upright {
+        true => SampleRotation::Upright,
+        false => SampleRotation::Any,
+    };
+    let cases = evaluate::draw(&Sampler::new(&sheets, rotation), args.samples, args.seed);
     if args.masks {
         return masks(args, &sheets, &evaluate::of_samples(&cases));
     }
@@ -83,25 +86,25 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             .fill(&request)
             .map_err(|error| EvaluateError::Filler(Box::new(error)))
     };
-    let plan = Plan {
+    let plan = EvaluationPlan {
         noises: args.noises(),
         seed: args.seed,
         options: PatchOptions::default(),
     };
     let work = cases.len() * plan.noises.len();
-    let progress = Progress::counted("samples", work as u64);
+    let progress = WorkProgress::counted("samples", work as u64);
     let report = evaluate::run(&cases, &plan, &fill, &|done| progress.advance(done as u64));
     drop(progress);
     let report = report.or_fail("evaluate")?;
     print!("{}", report.markdown());
-    let scanner = Scanner {
+    let scanner = SyntheticScanOptions {
         seed: args.seed,
         noise: args.scan_noise,
     };
-    let scans: Vec<Option<ScanRow>> = (Cut::ALL.into_iter())
-        .flat_map(|cut| {
+    let scans: Vec<Option<ScanRow>> = (HoleKind::ALL.into_iter())
+        .flat_map(|kind| {
             let sheets = &sheets[..args.scans.min(sheets.len())];
-            evaluate::over_scans(sheets, cut, &scanner, &|scan| mended(scan, &mender))
+            evaluate::over_scans(sheets, kind, &scanner, &|scan| mended(scan, &mender))
         })
         .collect();
     if !scans.is_empty() {
@@ -117,13 +120,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         files::write(path, &pretty(&text)?)?;
     }
     match &args.picture {
-        Some(path) => draw(&report, path),
+        Some(path) => files::write(path, evaluate::picture(&report).as_bytes()),
         None => Ok(()),
     }
 }
 
 impl Args {
-    /// Levels of noise, ascending, none among them.
+    /// Noise levels, ascending, with 0 among them.
     fn noises(&self) -> Vec<f64> {
         let mut all = self.noise.clone();
         all.push(0.0);
@@ -139,30 +142,42 @@ fn pretty(value: &serde_json::Value) -> Result<Vec<u8>, Failure> {
     Ok(text)
 }
 
-fn draw(report: &Report, path: &std::path::Path) -> Result<(), Failure> {
-    let mut png = Cursor::new(Vec::new());
-    evaluate::picture(report)
-        .write_to(&mut png, ImageFormat::Png)
-        .or_fail("encode the picture")?;
-    files::write(path, &png.into_inner())
+/// A line of the table of shares.
+struct MaskRow {
+    name: String,
+    /// Grids that could not be made.
+    refused: usize,
+    shares: Vec<GridShares>,
 }
 
-/// Prints and writes how holes share the grid, trained on and seen.
-fn masks(args: &Args, sheets: &[Sheet], trained: &[Shares]) -> Result<(), Failure> {
-    let mut rows: Vec<(String, usize, Vec<Shares>)> =
-        vec![("training samples".into(), 0, trained.to_vec())];
-    for cut in Cut::ALL {
-        let found = evaluate::of_flattened(sheets, cut, args.seed);
-        let flat: Vec<Shares> = found.iter().flatten().copied().collect();
-        let name = format!("flattened, {}", format!("{cut:?}").to_lowercase());
-        rows.push((name, found.len() - flat.len(), flat));
+/// Prints and writes the shares of the grid that holes take, in training samples and in flattened scans.
+fn masks(args: &Args, sheets: &[SimulatedSheet], trained: &[GridShares]) -> Result<(), Failure> {
+    let mut rows = vec![MaskRow {
+        name: "training samples".into(),
+        refused: 0,
+        shares: trained.to_vec(),
+    }];
+    for kind in HoleKind::ALL {
+        let found = evaluate::of_flattened(sheets, kind, args.seed);
+        let flat: Vec<GridShares> = found.iter().flatten().copied().collect();
+        let name = format!("flattened, {}", format!("{kind:?}").to_lowercase());
+        rows.push(MaskRow {
+            name,
+            refused: found.len() - flat.len(),
+            shares: flat,
+        });
     }
     println!(
         "Quantiles 5 / 25 / 50 / 75 / 95 %, in per cent of the grid (extent: of its side)\n\n\
          | | grids | refused | unknown | hole | extent of the hole | unknown outside |\n|---|---|---|---|---|---|---|"
     );
-    for (name, refused, shares) in &rows {
-        let parts: [fn(&Shares) -> f64; 4] =
+    for MaskRow {
+        name,
+        refused,
+        shares,
+    } in &rows
+    {
+        let parts: [fn(&GridShares) -> f64; 4] =
             [|s| s.unknown, |s| s.hole, |s| s.extent, |s| s.outside];
         let cells = parts.map(|part| quantiles(shares.iter().map(part).collect()));
         println!(
@@ -173,7 +188,7 @@ fn masks(args: &Args, sheets: &[Sheet], trained: &[Shares]) -> Result<(), Failur
     }
     if let Some(path) = &args.json {
         let all: Vec<_> = (rows.iter())
-            .map(|(name, refused, shares)| json!({"name": name, "refused": refused, "shares": shares}))
+            .map(|row| json!({"name": row.name, "refused": row.refused, "shares": row.shares}))
             .collect();
         files::write(path, &pretty(&json!(all))?)?;
     }

@@ -1,14 +1,15 @@
-//! How a command fails: one line that says what went wrong and why, and an exit code.
+//! How a command fails: one line of text and an exit code.
 
+use darn_contract::error_chain;
 use std::error::Error;
 use std::fmt;
 
-/// Why a command did not do its work.
+/// Why a command failed.
 #[derive(Debug)]
 pub enum Failure {
     /// Wrong usage or settings; exit 64.
     Usage(String),
-    /// The work itself failed; exit 1.
+    /// The work failed; exit 1.
     Failed {
         /// What was being done; completes "cannot …".
         doing: String,
@@ -32,27 +33,15 @@ impl fmt::Display for Failure {
         match self {
             Self::Usage(what) => f.write_str(what),
             Self::Failed { doing, cause } => {
-                write!(f, "cannot {doing}")?;
-                let mut said = String::new();
-                let mut next: Option<&(dyn Error + 'static)> = Some(cause.as_ref());
-                while let Some(error) = next {
-                    let text = error.to_string();
-                    // Many errors repeat their source in their own text.
-                    if !said.contains(&text) {
-                        write!(f, ": {text}")?;
-                        said.push_str(&text);
-                    }
-                    next = error.source();
-                }
-                Ok(())
+                write!(f, "cannot {doing}: {}", error_chain(cause.as_ref()))
             }
         }
     }
 }
 
-/// `result.or_fail("read in.glb")?`: an error of any kind becomes a [`Failure`] that says what was being done.
+/// Turns any error into a [`Failure`]: `result.or_fail("read in.glb")?`.
 pub trait OrFail<T> {
-    /// Turns the error into a failure to do `doing`.
+    /// An error becomes a failure whose text begins with "cannot `doing`".
     fn or_fail(self, doing: impl Into<String>) -> Result<T, Failure>;
 }
 

@@ -1,4 +1,4 @@
-//! Files of a command: read whole, written whole or not at all.
+//! Reads and writes whole files. A file is written completely or not at all.
 
 use super::failure::{Failure, OrFail};
 use std::fs;
@@ -9,7 +9,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     fs::read(path).or_fail(format!("read {}", path.display()))
 }
 
-/// Writes a file by way of a neighbour, so that nobody ever sees half of it.
+/// Writes a file beside its target and renames it, so that no reader sees a part of it.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let doing = || format!("write {}", path.display());
     let Some(name) = path.file_name() else {
@@ -23,7 +23,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let partial: PathBuf = path.with_file_name(partial);
     let written = fs::write(&partial, bytes).and_then(|()| fs::rename(&partial, path));
     if written.is_err() {
-        // Best effort: the failure to tell is the first one.
+        // The first failure is reported; one of this clean-up is not.
         let _ = fs::remove_file(&partial);
     }
     written.or_fail(doing())
@@ -34,7 +34,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_is_read_and_nothing_else_is_left() {
+    fn a_written_file_reads_back_and_leaves_no_other() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("a.glb");
         write(&path, b"first").expect("written");

@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct HealthcheckArgs {
     /// Where the service listens; 0.0.0.0 is asked on the loopback
     #[arg(
         long,
@@ -19,7 +19,7 @@ pub struct Args {
     patience: u64,
 }
 
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub fn run(args: &HealthcheckArgs) -> Result<(), Failure> {
     darn_serve::healthcheck(args.listen, Duration::from_secs(args.patience))
         .or_fail("see the service ready")?;
     println!("{}: ready", args.listen);
@@ -32,17 +32,17 @@ mod tests {
     use std::io::{Read, Write};
     use std::net::TcpListener;
 
-    /// Asks somebody who answers with `answer`.
-    fn asked(answer: &'static str) -> Result<(), Failure> {
+    /// The outcome against a server that answers with `answer`.
+    fn outcome_for(answer: &'static str) -> Result<(), Failure> {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
         let listen = listener.local_addr().expect("an address");
         let server = std::thread::spawn(move || {
             let (mut stream, _) = listener.accept().expect("a client");
-            // Whether the client reads to the end is its own affair.
+            // The client may close before it has read the whole answer.
             let _ = stream.read(&mut [0; 512]);
             let _ = stream.write_all(answer.as_bytes());
         });
-        let outcome = run(&Args {
+        let outcome = run(&HealthcheckArgs {
             listen,
             patience: 2,
         });
@@ -51,24 +51,24 @@ mod tests {
     }
 
     #[test]
-    fn ready_is_only_a_200() {
-        assert!(asked("HTTP/1.1 200 OK\r\ncontent-length: 0\r\n\r\n").is_ok());
+    fn only_a_200_is_ready() {
+        assert!(outcome_for("HTTP/1.1 200 OK\r\ncontent-length: 0\r\n\r\n").is_ok());
         for other in [
             "HTTP/1.1 503 Service Unavailable\r\n\r\n",
             "SSH-2.0-OpenSSH\r\n",
             "",
         ] {
-            assert_eq!(asked(other).expect_err(other).code(), 1);
+            assert_eq!(outcome_for(other).expect_err(other).code(), 1);
         }
     }
 
     #[test]
-    fn nobody_there_is_a_failure() {
+    fn no_server_is_a_failure() {
         let listen = TcpListener::bind("127.0.0.1:0")
             .and_then(|l| l.local_addr())
             .expect("a free port");
         assert_eq!(
-            run(&Args {
+            run(&HealthcheckArgs {
                 listen,
                 patience: 1
             })

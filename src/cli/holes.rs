@@ -7,7 +7,7 @@ use darn_gltf_scan::{Scan, ScanLimits};
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct HolesArgs {
     /// The scan: GLB, or glTF with data URIs
     scan: PathBuf,
     /// Print the report that POST /holes answers with
@@ -15,10 +15,10 @@ pub struct Args {
     json: bool,
 }
 
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub fn run(args: &HolesArgs) -> Result<(), Failure> {
     let bytes = files::read(&args.scan)?;
     let name = args.scan.display();
-    let scan = Scan::read(&bytes, &ScanLimits::default()).or_fail(format!("read {name}"))?;
+    let scan = Scan::read(bytes, &ScanLimits::default()).or_fail(format!("read {name}"))?;
     let report = darn_mend::find_holes(&scan);
     if args.json {
         println!(
@@ -50,7 +50,7 @@ fn line(rim: &Loop) -> String {
     format!(
         "{:>4}  {:<14} {:>9} {:>12.4} {:>9.2}  {}\n",
         rim.id,
-        kind(rim.kind()),
+        kind_name(rim.kind()),
         rim.vertices,
         rim.length,
         rim.turning,
@@ -58,8 +58,8 @@ fn line(rim: &Loop) -> String {
     )
 }
 
-/// What a loop is, for a person.
-pub fn kind(kind: LoopKind) -> &'static str {
+/// The name of a kind of loop, as commands print it.
+pub fn kind_name(kind: LoopKind) -> &'static str {
     match kind {
         LoopKind::Hole => "hole",
         LoopKind::OuterBoundary => "outer boundary",
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_loop_and_note_has_its_line() {
+    fn every_loop_and_note_has_a_line() {
         let rim = Loop {
             id: 7,
             kind: LoopKind::Hole.into(),

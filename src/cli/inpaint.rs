@@ -2,9 +2,9 @@
 
 use super::failure::{Failure, OrFail};
 use super::files;
-use super::holes::kind;
+use super::holes::kind_name;
 use super::network::mender;
-use super::progress::Progress;
+use super::progress::WorkProgress;
 use crate::settings::NetworkArgs;
 use darn_contract::v1::{HoleReport, Report};
 use darn_contract::{Constraints, FieldError};
@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct InpaintArgs {
     /// The scan: GLB, or glTF with data URIs
     scan: PathBuf,
     /// Where the mended scan goes, in the container the scan came in
@@ -29,9 +29,9 @@ pub struct Args {
     network: NetworkArgs,
 }
 
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub fn run(args: &InpaintArgs) -> Result<(), Failure> {
     let name = args.scan.display();
-    let progress = Progress::staged("darn");
+    let progress = WorkProgress::staged("darn");
     progress.stage("reading");
     let constraints = match &args.constraints {
         Some(path) => constraints(path)?,
@@ -39,7 +39,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     };
     let bytes = files::read(&args.scan)?;
     let started = Instant::now();
-    let scan = Scan::read(&bytes, &ScanLimits::default()).or_fail(format!("read {name}"))?;
+    let scan = Scan::read(bytes, &ScanLimits::default()).or_fail(format!("read {name}"))?;
     let read = started.elapsed();
     progress.stage("loading weights");
     let mender = mender(&args.network)?;
@@ -59,7 +59,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The constraints in a file; what is wrong with them is a matter of usage.
+/// The constraints in a file; invalid ones are wrong usage.
 fn constraints(path: &Path) -> Result<Constraints, Failure> {
     let name = path.display();
     let text = files::read(path)?;
@@ -71,7 +71,7 @@ fn constraints(path: &Path) -> Result<Constraints, Failure> {
     })
 }
 
-/// One line a loop: what was filled with what, and what was left.
+/// One line for each loop, with its patch or the reason why it was left, and one for each note.
 fn summary(report: &Report) -> String {
     let mut text = String::new();
     for hole in &report.holes {
@@ -84,13 +84,13 @@ fn summary(report: &Report) -> String {
             "hole {}: rim of {} vertices, length {:.4}; patched with {} faces, stretch {:.3}{crossings}\n",
             hole.id, hole.vertices, hole.length, patch.faces, patch.stretch_mean
         ));
-        text.push_str(&kept(hole));
+        text.push_str(&distances(hole));
     }
     for left in &report.skipped {
         text.push_str(&format!(
             "left loop {} ({}): {}\n",
             left.id,
-            kind(left.kind()),
+            kind_name(left.kind()),
             left.reason
         ));
     }
@@ -104,8 +104,8 @@ fn summary(report: &Report) -> String {
     text
 }
 
-/// One line an anchor or gesture: how near the cloth came.
-fn kept(hole: &HoleReport) -> String {
+/// One line for each anchor or gesture: its distance to the cloth.
+fn distances(hole: &HoleReport) -> String {
     let anchors = hole.anchors.iter().map(|a| {
         let at: Vec<String> = a.uv.iter().map(|x| format!("{x:.3}")).collect();
         format!("  anchor at {}: {:.4} away\n", at.join(" "), a.distance)
@@ -125,7 +125,7 @@ mod tests {
     use darn_contract::v1::Skipped;
 
     #[test]
-    fn every_loop_has_its_line() {
+    fn every_loop_has_a_line() {
         let report = Report {
             holes: vec![HoleReport {
                 id: 1,
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_constraints_are_a_matter_of_usage() {
+    fn invalid_constraints_are_wrong_usage() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("c.json");
         std::fs::write(&path, r#"{"hole": []}"#).expect("written");

@@ -1,6 +1,7 @@
-//! The command line: one file a command; each reads files, calls the library and writes files.
-//! May use every room of the library; exit codes are 0 done, 1 failed, 64 wrong usage or settings.
-//! No geometry, no HTTP routes, no training: a command that grows a second idea wants a room in the library.
+//! The command line: one file for each command, which reads files, calls the crates and writes files.
+//!
+//! Exit codes: 0 done, 1 failed, 64 wrong usage or settings. Geometry, HTTP routes and training belong to the crates,
+//! not here.
 
 mod bench;
 #[cfg(feature = "burn")]
@@ -40,23 +41,23 @@ const USAGE: u8 = 64;
 #[command(name = "darn", version, about, arg_required_else_help = true)]
 struct Cli {
     #[command(subcommand)]
-    command: Command,
+    command: CliCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {
+enum CliCommand {
     /// Serve HTTP: POST a scan to /inpaint, get it back mended
     Serve(ServeCommand),
     /// Fill the holes of a scan
-    Inpaint(inpaint::Args),
+    Inpaint(inpaint::InpaintArgs),
     /// Search where on a hole's chart a point in space belongs
-    OptimizeAnchor(optimize_anchor::Args),
+    OptimizeAnchor(optimize_anchor::OptimizeAnchorArgs),
     /// List the boundary loops of a scan: its holes, its border, the ends of its sleeves
-    Holes(holes::Args),
+    Holes(holes::HolesArgs),
     /// Draw a shaded picture of a scan; reconstructed cloth is tinted
-    Render(render::Args),
+    Render(render::RenderArgs),
     /// Ask a running service whether it is ready: exit 0 if so, 1 if not
-    Healthcheck(healthcheck::Args),
+    Healthcheck(healthcheck::HealthcheckArgs),
     /// Simulate sheets of cloth to train on
     #[cfg(feature = "burn")]
     Scarffolds(scarffolds::Args),
@@ -70,7 +71,7 @@ enum Command {
     #[cfg(feature = "burn")]
     Evaluate(evaluate::Args),
     /// Measure how long the network and a mend take here
-    Bench(bench::Args),
+    Bench(bench::BenchArgs),
     /// Print the service's OpenAPI document
     Openapi,
 }
@@ -80,7 +81,7 @@ pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
-            // Help and version come as errors too, but are what was asked for.
+            // clap returns help and version as errors too; those exit with 0.
             let code = if error.use_stderr() { USAGE } else { 0 };
             return match error.print() {
                 Ok(()) => ExitCode::from(code),
@@ -97,33 +98,33 @@ pub fn main() -> ExitCode {
     }
 }
 
-fn run(command: Command) -> Result<(), Failure> {
-    // The service starts logging by its own settings.
-    if !matches!(command, Command::Serve(_)) {
-        start_logging(usual_log(), LogFormat::Text).map_err(Failure::Usage)?;
+fn run(command: CliCommand) -> Result<(), Failure> {
+    // The service starts logging with its own settings.
+    if !matches!(command, CliCommand::Serve(_)) {
+        start_logging(command_log(), LogFormat::Text).map_err(Failure::Usage)?;
     }
     match command {
-        Command::Serve(settings) => serve::run(&settings),
-        Command::Inpaint(args) => inpaint::run(&args),
-        Command::OptimizeAnchor(args) => optimize_anchor::run(&args),
-        Command::Holes(args) => holes::run(&args),
-        Command::Render(args) => render::run(&args),
-        Command::Healthcheck(args) => healthcheck::run(&args),
+        CliCommand::Serve(settings) => serve::run(&settings),
+        CliCommand::Inpaint(args) => inpaint::run(&args),
+        CliCommand::OptimizeAnchor(args) => optimize_anchor::run(&args),
+        CliCommand::Holes(args) => holes::run(&args),
+        CliCommand::Render(args) => render::run(&args),
+        CliCommand::Healthcheck(args) => healthcheck::run(&args),
         #[cfg(feature = "burn")]
-        Command::Scarffolds(args) => scarffolds::run(&args),
+        CliCommand::Scarffolds(args) => scarffolds::run(&args),
         #[cfg(feature = "burn")]
-        Command::Samples(args) => samples::run(&args),
+        CliCommand::Samples(args) => samples::run(&args),
         #[cfg(feature = "burn")]
-        Command::Train(args) => train::run(&args),
+        CliCommand::Train(args) => train::run(&args),
         #[cfg(feature = "burn")]
-        Command::Evaluate(args) => evaluate::run(&args),
-        Command::Bench(args) => bench::run(&args),
-        Command::Openapi => openapi::run(),
+        CliCommand::Evaluate(args) => evaluate::run(&args),
+        CliCommand::Bench(args) => bench::run(&args),
+        CliCommand::Openapi => openapi::run(),
     }
 }
 
-/// What a command logs: progress where no terminal shows a bar, warnings everywhere.
-fn usual_log() -> &'static str {
+/// The log filter of a command: warnings, and progress if no terminal shows a bar.
+fn command_log() -> &'static str {
     if std::io::stderr().is_terminal() {
         "warn"
     } else {

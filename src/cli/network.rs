@@ -1,17 +1,17 @@
-//! The networks a command works with: the shipped weights, built into the binary, or files of one's own.
+//! The networks of a command: the shipped weights, which are built into the binary, or weights files.
 
 use super::failure::{Failure, OrFail};
 use super::files;
 use crate::settings::{Autodiff, Backend, NetworkArgs};
 #[cfg(feature = "burn")]
-use darn_lab::unet::{BackendKind, Settings, load_network};
+use darn_lab::unet::{BackendKind, BackendSettings, load_network};
 use darn_mend::NetworkMender;
 use darn_net::engine::EngineOptions;
 use darn_net::{NetError, Network, Networks};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
-/// The weights that are used when none are named; the first are the default ones.
+/// The shipped weights by file name; the first are the default.
 const SHIPPED: [(&str, &[u8]); 3] = [
     (
         STANDARD,
@@ -26,17 +26,18 @@ const SHIPPED: [(&str, &[u8]); 3] = [
         include_bytes!("../../weights/interpen.safetensors"),
     ),
 ];
-/// The default weights' file in a directory of weights.
+/// The file of the default weights, in a directory too.
 const STANDARD: &str = "standard.safetensors";
 
-/// The default weights as shipped.
+/// The file of the shipped default weights.
 pub fn standard() -> &'static [u8] {
     SHIPPED[0].1
 }
 
-/// Loads the networks that were asked for, or the shipped ones.
+/// Loads the networks that the settings name, or the shipped ones.
 ///
-/// Of a directory, all files whose name ends in `.safetensors`: `standard.safetensors`, which must be there, is the default.
+/// Of a directory it loads all files whose names end in `.safetensors`; `standard.safetensors` must be there and is the
+/// default.
 pub fn mender(args: &NetworkArgs) -> Result<NetworkMender, Failure> {
     let load = |bytes: &[u8], name: &str| loaded(bytes, args).or_fail(format!("load {name}"));
     let networks: Result<Vec<Network>, Failure> = match &args.weights {
@@ -56,7 +57,7 @@ pub fn mender(args: &NetworkArgs) -> Result<NetworkMender, Failure> {
     Ok(NetworkMender::new(networks))
 }
 
-/// The weights in a directory, the default ones first, the others by name.
+/// The weights files in a directory: the default first, the others sorted by name.
 fn in_directory(path: &Path) -> Result<Vec<PathBuf>, Failure> {
     let name = path.display();
     let entries = std::fs::read_dir(path).or_fail(format!("read {name}"))?;
@@ -73,7 +74,7 @@ fn in_directory(path: &Path) -> Result<Vec<PathBuf>, Failure> {
     Ok(others)
 }
 
-/// Copies of a grid, and places of a search, are divided among all threads; a single grid's layers, too.
+/// All threads share the work: copies of a grid, places of a search, and the layers of a single grid.
 fn options() -> EngineOptions {
     EngineOptions {
         isa: None,
@@ -81,7 +82,7 @@ fn options() -> EngineOptions {
     }
 }
 
-/// A network that computes as the settings say.
+/// A network on the backend that the settings name.
 #[cfg(feature = "burn")]
 fn loaded(bytes: &[u8], args: &NetworkArgs) -> Result<Network, NetError> {
     let backend = match args.backend {
@@ -93,7 +94,7 @@ fn loaded(bytes: &[u8], args: &NetworkArgs) -> Result<Network, NetError> {
         (Autodiff::Burn, BackendKind::Engine) => Some(BackendKind::Flex),
         _ => None,
     };
-    let settings = Settings {
+    let settings = BackendSettings {
         backend,
         autodiff,
         engine: options(),
@@ -101,7 +102,7 @@ fn loaded(bytes: &[u8], args: &NetworkArgs) -> Result<Network, NetError> {
     load_network(bytes, settings)
 }
 
-/// A network on darn's own engine: a build without burn has no other.
+/// A network on darn's own engine: a build without burn has no other backend.
 #[cfg(not(feature = "burn"))]
 fn loaded(bytes: &[u8], args: &NetworkArgs) -> Result<Network, NetError> {
     let NetworkArgs {
@@ -117,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_shipped_weights_are_called_as_their_files_are() {
+    fn the_shipped_networks_have_the_names_of_their_files() {
         let args = NetworkArgs {
             weights: None,
             backend: Backend::Engine,

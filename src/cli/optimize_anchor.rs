@@ -1,16 +1,16 @@
-//! `darn optimize-anchor`: where on a hole's grid a point in space belongs.
+//! `darn optimize-anchor`: searches where on a hole's grid a point in space belongs.
 
 use super::failure::{Failure, OrFail};
 use super::files;
 use super::network::mender;
-use super::progress::Progress;
+use super::progress::WorkProgress;
 use crate::settings::NetworkArgs;
 use darn_contract::Search;
 use darn_gltf_scan::{Scan, ScanLimits};
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct OptimizeAnchorArgs {
     /// The scan: GLB, or glTF with data URIs
     scan: PathBuf,
     /// The point that the cloth should reach, in scene space
@@ -35,12 +35,12 @@ pub struct Args {
     network: NetworkArgs,
 }
 
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub fn run(args: &OptimizeAnchorArgs) -> Result<(), Failure> {
     let name = args.scan.display();
-    let progress = Progress::staged("darn");
+    let progress = WorkProgress::staged("darn");
     progress.stage("reading");
     let bytes = files::read(&args.scan)?;
-    let scan = Scan::read(&bytes, &ScanLimits::default()).or_fail(format!("read {name}"))?;
+    let scan = Scan::read(bytes, &ScanLimits::default()).or_fail(format!("read {name}"))?;
     progress.stage("loading weights");
     let mender = mender(&args.network)?;
     progress.stage("searching");
@@ -54,7 +54,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut found =
         darn_mend::optimize_anchor(&scan, &search, &mender).or_fail(format!("search {name}"))?;
     if let Some(path) = &args.map {
-        // The picture is in its file; in the JSON it would only be base64.
+        // The picture is in its file; the JSON would repeat it as base64.
         files::write(path, &std::mem::take(&mut found.map_png))?;
     }
     if let Some(path) = &args.mend {
@@ -69,7 +69,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-/// `N` finite numbers with commas between them.
+/// `N` finite numbers, separated by commas.
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let each: Result<Vec<f64>, _> = text.split(',').map(|x| x.trim().parse::<f64>()).collect();
     let each = each.map_err(|error| error.to_string())?;
@@ -79,7 +79,7 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     <[f64; N]>::try_from(each).map_err(|each| format!("expected {N} numbers; got {}", each.len()))
 }
 
-/// A place on the chart.
+/// A place on the chart: two numbers from 0 to 1.
 fn uv(text: &str) -> Result<[f64; 2], String> {
     let uv = numbers::<2>(text)?;
     match uv.iter().find(|x| !(0.0..=1.0).contains(*x)) {

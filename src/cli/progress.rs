@@ -1,32 +1,32 @@
-//! Progress of long work: a bar on a terminal, log lines elsewhere.
+//! Progress of long work: a bar on a terminal, log lines if there is no terminal.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// Log lines a counted piece of work comes to.
+/// Log lines of a whole piece of counted work.
 const LINES: u64 = 20;
 
 /// Progress of one piece of work; threads may share it.
 #[derive(Debug)]
-pub struct Progress {
+pub struct WorkProgress {
     name: &'static str,
     total: u64,
     done: AtomicU64,
     started: Instant,
-    /// On a terminal.
+    /// `None` if standard error is no terminal.
     bar: Option<ProgressBar>,
 }
 
-impl Progress {
+impl WorkProgress {
     /// Work of `total` equal pieces.
     pub fn counted(name: &'static str, total: u64) -> Self {
         let style = ProgressStyle::with_template("{prefix} [{bar:40}] {pos}/{len} {msg} {eta}");
         Self::shown(name, total, style.map(|style| style.progress_chars("=> ")))
     }
 
-    /// Work of a few named stages.
+    /// Work of a few stages with names.
     pub fn staged(name: &'static str) -> Self {
         Self::shown(
             name,
@@ -57,7 +57,7 @@ impl Progress {
         }
     }
 
-    /// Says what is being done now.
+    /// Shows the stage that begins now.
     pub fn stage(&self, what: &str) {
         match &self.bar {
             Some(bar) => bar.set_message(what.to_owned()),
@@ -65,7 +65,7 @@ impl Progress {
         }
     }
 
-    /// Says that `pieces` more are done.
+    /// Counts `pieces` more as done.
     pub fn advance(&self, pieces: u64) {
         let before = self.done.fetch_add(pieces, Ordering::Relaxed);
         let now = before + pieces;
@@ -88,7 +88,7 @@ impl Progress {
     }
 }
 
-impl Drop for Progress {
+impl Drop for WorkProgress {
     fn drop(&mut self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
@@ -96,7 +96,7 @@ impl Drop for Progress {
     }
 }
 
-/// How many log lines `done` of `total` pieces have earned.
+/// How many log lines belong to `done` of `total` pieces.
 fn step(done: u64, total: u64) -> u64 {
     done.saturating_mul(LINES) / total.max(1)
 }
@@ -106,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn long_work_comes_to_few_lines() {
+    fn long_work_logs_few_lines() {
         let lines = (0..10_000)
             .filter(|&k| step(k, 10_000) < step(k + 1, 10_000))
             .count();

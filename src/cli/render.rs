@@ -1,16 +1,18 @@
-//! `darn render`: a picture of a scan, reconstructed cloth tinted.
+//! `darn render`: a picture of a scan; reconstructed cloth has another colour.
 
 use super::failure::{Failure, OrFail};
 use super::files;
 use darn_geometry::mesh::{Vec3, weld};
 use darn_gltf_scan::{Scan, ScanLimits};
-use darn_render::{Aim, CLOTH, Framing, Lines, MAX_SIDE, MENDED, View, picture};
+use darn_render::{
+    CLOTH, CameraDirection, EdgeLines, Framing, MAX_SIDE, MENDED, PictureOptions, picture,
+};
 use image::ImageFormat;
 use std::io::Cursor;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct RenderArgs {
     /// The scan: GLB, or glTF with data URIs
     scan: PathBuf,
     /// Where the picture goes, as PNG
@@ -30,17 +32,17 @@ pub struct Args {
     wireframe: bool,
 }
 
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub fn run(args: &RenderArgs) -> Result<(), Failure> {
     let bytes = files::read(&args.scan)?;
-    let scan = Scan::read(&bytes, &ScanLimits::default())
+    let scan = Scan::read(bytes, &ScanLimits::default())
         .or_fail(format!("read {}", args.scan.display()))?;
     let welded = weld::weld(&scan.surface);
     let tints: Vec<[u8; 3]> = welded
-        .face_of
+        .soup_face
         .iter()
         .map(|&face| tint(&scan, face))
         .collect();
-    let image = picture(&welded.mesh, &tints, &args.framed());
+    let image = picture(&welded.mesh, &tints, &args.options());
     let mut png = Cursor::new(Vec::new());
     image
         .write_to(&mut png, ImageFormat::Png)
@@ -48,32 +50,31 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     files::write(&args.output, &png.into_inner())
 }
 
-impl Args {
-    fn framed(&self) -> View {
-        View {
+impl RenderArgs {
+    fn options(&self) -> PictureOptions {
+        PictureOptions {
             size: self.size,
-            aim: self
-                .view
-                .map_or(Aim::Auto, |[azimuth, elevation]| Aim::Angles {
-                    azimuth,
-                    elevation,
-                }),
-            framing: self
-                .focus
-                .map_or(Framing::Whole, |[x, y, z, radius]| Framing::Focus {
+            direction: match self.view {
+                Some([azimuth, elevation]) => CameraDirection::Angles { azimuth, elevation },
+                None => CameraDirection::Auto,
+            },
+            framing: match self.focus {
+                Some([x, y, z, radius]) => Framing::Focus {
                     centre: Vec3::new(x, y, z),
                     radius,
-                }),
+                },
+                None => Framing::Whole,
+            },
             lines: if self.wireframe {
-                Lines::Wireframe
+                EdgeLines::Wireframe
             } else {
-                Lines::Rims
+                EdgeLines::Rims
             },
         }
     }
 }
 
-/// The colour of a face of the scan's surface: evidence and reconstruction are told apart.
+/// The colour of a face of the scan's surface: one for scanned cloth, one for reconstructed cloth.
 fn tint(scan: &Scan, face: u32) -> [u8; 3] {
     let part = scan
         .part_of_face(face)
@@ -85,6 +86,7 @@ fn tint(scan: &Scan, face: u32) -> [u8; 3] {
     }
 }
 
+/// Width and height in pixels, as in 1200x900.
 fn size(text: &str) -> Result<[u32; 2], String> {
     let (width, height) = text
         .split_once('x')
@@ -98,6 +100,7 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     Ok([side(width)?, side(height)?])
 }
 
+/// `N` finite numbers, separated by commas.
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let all: Result<Vec<f64>, _> = text
         .split(',')

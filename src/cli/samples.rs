@@ -1,9 +1,9 @@
-//! `darn samples`: what a trainer outside this program learns from, as records on standard output.
+//! `darn samples`: training samples for a trainer outside this program, as records on standard output.
 
 use super::failure::{Failure, OrFail};
-use darn_lab::scarffolds::samples::Turning;
-use darn_lab::train::batch::{Prepared, Recipe, prepare};
-use darn_lab::train::{self, record};
+use darn_lab::scarffolds::samples::SampleRotation;
+use darn_lab::train::batch::{BatchGenerator, PreparedSample, prepare};
+use darn_lab::train::{self, sample_records};
 use darn_net::{FrameKind, UnetConfig};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -45,8 +45,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             "records are bytes: send standard output to a file or a program".into(),
         ));
     }
-    let turning = Turning::keeping_up(args.upright);
-    let sampler = train::sampler(&args.sheets, turning).or_fail("read the sheets")?;
+    let rotation = match args.upright {
+        true => SampleRotation::Upright,
+        false => SampleRotation::Any,
+    };
+    let sampler = train::sampler(&args.sheets, rotation).or_fail("read the sheets")?;
     let network = UnetConfig {
         frame: match args.upright {
             true => FrameKind::Hanging,
@@ -55,10 +58,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         ..UnetConfig::default()
     };
     let mut records = Vec::new();
-    // Whether anybody reads on.
-    let mut send = |samples: &[Prepared]| {
+    // Returns whether the reader still reads.
+    let mut send = |samples: &[PreparedSample]| {
         records.clear();
-        record::write(samples, &mut records);
+        sample_records::write(samples, &mut records);
         match out.write_all(&records) {
             Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
             written => written.or_fail("write samples").map(|()| true),
@@ -69,7 +72,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let samples = samples.iter().filter_map(|s| prepare(s, &network));
         return send(&samples.collect::<Vec<_>>()).map(|_| ());
     }
-    let recipe = Recipe {
+    let generator = BatchGenerator {
         source: train::source(sampler.roughest_of(args.roughest_of), args.alike),
         network,
         size: TOGETHER,
@@ -78,7 +81,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut rng = ChaCha8Rng::seed_from_u64(args.seed);
     let mut left = args.count.unwrap_or(usize::MAX);
     while left > 0 {
-        let mut samples = recipe.samples(&mut rng);
+        let mut samples = generator.samples(&mut rng);
         samples.truncate(left);
         left -= samples.len();
         if !send(&samples)? {

@@ -2,9 +2,9 @@
 
 use super::failure::{Failure, OrFail};
 use super::files;
-use super::progress::Progress;
+use super::progress::WorkProgress;
 use darn_lab::scarffolds::export::{as_glb, contact_sheet};
-use darn_lab::scarffolds::sheets::{self, Sheet};
+use darn_lab::scarffolds::sheets::{self, SimulatedSheet};
 use image::ImageFormat;
 use rand::SeedableRng;
 use rand::seq::index::sample;
@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-/// Sheets in a picture.
+/// Most sheets in a picture.
 const PICTURED: usize = 12;
 
 #[derive(Debug, clap::Args)]
@@ -45,7 +45,7 @@ enum Format {
 }
 
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let progress = Progress::counted("sheets", args.count as u64);
+    let progress = WorkProgress::counted("sheets", args.count as u64);
     let made = sheets::generate(args.count, args.seed, &args.out, &|finished| {
         progress.advance(finished as u64)
     });
@@ -74,7 +74,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-fn export(sheets: &[Sheet], out: &Path) -> Result<(), Failure> {
+fn export(sheets: &[SimulatedSheet], out: &Path) -> Result<(), Failure> {
     for (number, sheet) in sheets.iter().enumerate() {
         let name = format!("sheet-{number:06}");
         let bytes = as_glb(sheet, &name).or_fail(format!("write {name}"))?;
@@ -85,11 +85,11 @@ fn export(sheets: &[Sheet], out: &Path) -> Result<(), Failure> {
 }
 
 /// Draws sheets that the seed chooses.
-fn draw(sheets: &[Sheet], seed: u64, path: &Path) -> Result<(), Failure> {
+fn draw(sheets: &[SimulatedSheet], seed: u64, path: &Path) -> Result<(), Failure> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut chosen = sample(&mut rng, sheets.len(), PICTURED.min(sheets.len())).into_vec();
     chosen.sort_unstable();
-    let shown: Vec<&Sheet> = chosen.iter().map(|&k| &sheets[k]).collect();
+    let shown: Vec<&SimulatedSheet> = chosen.iter().map(|&k| &sheets[k]).collect();
     let mut png = Cursor::new(Vec::new());
     contact_sheet(&shown)
         .write_to(&mut png, ImageFormat::Png)

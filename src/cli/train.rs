@@ -1,7 +1,9 @@
 //! `darn train`: train a network on simulated sheets.
 
 use super::failure::{Failure, OrFail};
-use darn_lab::train::{LossWeights, Progress, Score, Start, TrainOptions, Trainer};
+use darn_lab::train::{
+    LossTerms, LossWeights, RunStart, Score, TrainOptions, TrainProgress, TrainerKind,
+};
 use darn_net::{FrameKind, InputKind, UnetConfig};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
@@ -9,7 +11,7 @@ use std::path::PathBuf;
 
 /// Steps of the progress bar.
 const BAR: u64 = 1000;
-/// Log lines of a whole run, besides those with scores.
+/// Log lines of a whole run, in addition to those with scores.
 const LINES: f64 = 50.0;
 
 #[derive(Debug, clap::Args)]
@@ -83,12 +85,12 @@ pub struct Args {
     /// Go on from the checkpoint in the output folder
     #[arg(long)]
     resume: bool,
-    /// Start from the weights in this file instead of random ones
+    /// RunStart from the weights in this file instead of random ones
     #[arg(long, conflicts_with = "resume")]
     from: Option<PathBuf>,
 }
 
-/// What can be seen in unknown cells.
+/// The input of unknown cells.
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
 enum Input {
     /// Nothing: zeros (the paper)
@@ -140,12 +142,12 @@ enum Steps {
 }
 
 impl Steps {
-    fn kind(self) -> Trainer {
+    fn kind(self) -> TrainerKind {
         match self {
-            Self::Burn => Trainer::Burn,
-            Self::Engine => Trainer::Engine,
+            Self::Burn => TrainerKind::Burn,
+            Self::Engine => TrainerKind::Engine,
             #[cfg(feature = "cuda")]
-            Self::Cuda => Trainer::Cuda,
+            Self::Cuda => TrainerKind::Cuda,
         }
     }
 }
@@ -172,10 +174,10 @@ impl Loss {
 }
 
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let mut told = Told::new();
-    let summary = darn_lab::train::run(&args.options(), &mut |progress| told.step(progress))
+    let mut output = ProgressOutput::new();
+    let summary = darn_lab::train::run(&args.options(), &mut |progress| output.step(progress))
         .or_fail("train")?;
-    drop(told);
+    drop(output);
     println!(
         "{} steps in {:.1} minutes; weights in {}",
         summary.steps,
@@ -205,9 +207,9 @@ impl Args {
             held_out: self.held_out.clone(),
             out: self.out.clone(),
             resume: if self.resume {
-                Start::Resume
+                RunStart::Resume
             } else {
-                Start::Fresh
+                RunStart::Fresh
             },
             from: self.from.clone(),
             trainer: self.trainer.kind(),
@@ -236,13 +238,13 @@ impl Args {
 }
 
 /// A bar on a terminal, log lines elsewhere; scores always get a line.
-struct Told {
+struct ProgressOutput {
     bar: Option<ProgressBar>,
     /// Log lines so far.
     lines: f64,
 }
 
-impl Told {
+impl ProgressOutput {
     fn new() -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
             let bar = ProgressBar::new(BAR).with_prefix("train");
@@ -256,8 +258,14 @@ impl Told {
         Self { bar, lines: 0.0 }
     }
 
-    fn step(&mut self, now: &Progress) {
-        let [total, data, gradient, stretch, self_penetration] = now.loss;
+    fn step(&mut self, now: &TrainProgress) {
+        let LossTerms {
+            total,
+            data,
+            gradient,
+            stretch,
+            self_penetration,
+        } = now.loss;
         if let Some(bar) = &self.bar {
             bar.set_position((now.share * BAR as f64) as u64);
             bar.set_message(format!("step {} loss {total:.4}", now.step));
@@ -275,12 +283,12 @@ impl Told {
                 "training"
             );
         }
-        if let Some([network, fill]) = &now.scores {
+        if let Some(scores) = &now.scores {
             let text = format!(
                 "step {}: network {}; input fill {}",
                 now.step,
-                line(network),
-                line(fill)
+                line(&scores.network),
+                line(&scores.fill)
             );
             match &self.bar {
                 Some(bar) => bar.println(text),
@@ -290,7 +298,7 @@ impl Told {
     }
 }
 
-impl Drop for Told {
+impl Drop for ProgressOutput {
     fn drop(&mut self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

@@ -7,12 +7,12 @@ use darn_contract::port::Mended;
 use darn_geometry::mesh::curvature::{face_areas, vertex_normals};
 use darn_geometry::mesh::loops::{BoundaryLoop, boundary_loops};
 use darn_geometry::mesh::topology::Topology;
-use darn_geometry::mesh::weld::{Welded, weld};
+use darn_geometry::mesh::weld::{WeldedMesh, weld};
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
 use darn_gltf_scan::Scan;
-use darn_gltf_scan::export::{Fresh, glb};
-use darn_lab::scarffolds::scanned::{Hole, Scanned, scanned};
-use darn_lab::scarffolds::sheets::{self, Sheet};
+use darn_gltf_scan::export::{NewMesh, glb};
+use darn_lab::scarffolds::holed_scan::{HoleShape, HoledScan, holed_scan};
+use darn_lab::scarffolds::sheets::{self, SimulatedSheet};
 use darn_mend::{MendError, NetworkMender, mend};
 use darn_net::engine::EngineOptions;
 use darn_net::{Network, Networks};
@@ -23,14 +23,14 @@ use rand_chacha::ChaCha8Rng;
 pub const WEIGHTS: &[u8] = include_bytes!("../../weights/standard.safetensors");
 
 /// A hole in the middle, a quarter of the sheet wide.
-pub const ROUND: Hole = Hole::Circle {
+pub const ROUND: HoleShape = HoleShape::Circle {
     centre: Vec2::new(0.5, 0.48),
     radius: 0.13,
 };
 
 /// A network that ships.
 pub fn network(weights: &[u8]) -> Network {
-    Network::load(weights, Options::default()).expect("the shipped weights load")
+    Network::load(weights, EngineOptions::default()).expect("the shipped weights load")
 }
 
 /// The mender, loaded once for all tests.
@@ -45,23 +45,23 @@ pub fn mender() -> &'static Arc<NetworkMender> {
 }
 
 /// Simulated sheets, made once for all tests.
-pub fn sheet(index: usize) -> &'static Sheet {
-    static SHEETS: OnceLock<Vec<Sheet>> = OnceLock::new();
+pub fn sheet(index: usize) -> &'static SimulatedSheet {
+    static SHEETS: OnceLock<Vec<SimulatedSheet>> = OnceLock::new();
     let make = || (0..3).map(|k| sheets::make(20, k).expect("a sheet").0);
     &SHEETS.get_or_init(|| make().collect())[index]
 }
 
 /// A sheet that `place` lays over (u, v) in the unit square.
-pub fn laid(place: impl Fn(f32, f32) -> [f32; 3]) -> Sheet {
+pub fn laid(place: impl Fn(f32, f32) -> [f32; 3]) -> SimulatedSheet {
     let at = |k: usize| place((k % 51) as f32 / 50.0, (k / 51) as f32 / 50.0);
-    Sheet {
+    SimulatedSheet {
         positions: (0..51 * 51).map(at).collect(),
     }
 }
 
 /// A sheet as a scan of about 45² vertices with a hole.
-pub fn holed(sheet: &Sheet, hole: &Hole) -> Scanned {
-    scanned(sheet, 45, hole, &mut ChaCha8Rng::seed_from_u64(5))
+pub fn holed(sheet: &SimulatedSheet, hole: &HoleShape) -> HoledScan {
+    holed_scan(sheet, 45, hole, &mut ChaCha8Rng::seed_from_u64(5))
 }
 
 /// A mesh as GLB; texture coordinates may be left empty.
@@ -69,7 +69,7 @@ pub fn packed(mesh: &TriMesh, texcoords: &[[f32; 2]]) -> Vec<u8> {
     let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| p.cast().into()).collect();
     let normals = vertex_normals(mesh);
     let normals: Vec<[f32; 3]> = normals.iter().map(|n| n.cast().into()).collect();
-    let fresh = Fresh {
+    let fresh = NewMesh {
         name: "scarf",
         positions: &positions,
         normals: &normals,
@@ -80,7 +80,7 @@ pub fn packed(mesh: &TriMesh, texcoords: &[[f32; 2]]) -> Vec<u8> {
 }
 
 pub fn read(bytes: &[u8]) -> Scan {
-    Scan::read(bytes, &darn_gltf_scan::ScanLimits::default()).expect("a readable scan")
+    Scan::read(bytes.to_vec(), &darn_gltf_scan::ScanLimits::default()).expect("a readable scan")
 }
 
 pub fn mended(bytes: &[u8], constraints: &Constraints) -> Result<Mended, MendError> {
@@ -90,7 +90,7 @@ pub fn mended(bytes: &[u8], constraints: &Constraints) -> Result<Mended, MendErr
 /// A mended scan, welded, and which of its faces are reconstructed.
 pub struct Seen {
     pub scan: Scan,
-    pub welded: Welded,
+    pub welded: WeldedMesh,
     pub topology: Topology,
     pub loops: Vec<BoundaryLoop>,
     pub patch: Vec<usize>,
@@ -103,7 +103,7 @@ impl Seen {
         let topology = Topology::new(&welded.mesh);
         let loops = boundary_loops(&welded.mesh, &topology);
         let new = |f: &usize| {
-            let part = scan.part_of_face(welded.face_of[*f]).expect("a part");
+            let part = scan.part_of_face(welded.soup_face[*f]).expect("a part");
             scan.parts[part].reconstructed
         };
         let patch = (0..welded.mesh.faces.len()).filter(new).collect();

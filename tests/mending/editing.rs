@@ -5,7 +5,7 @@ use std::sync::Arc;
 use darn_contract::port::Cancellation;
 use darn_contract::{Anchor, Constraints, Edit, Gesture, Search};
 use darn_geometry::mesh::{Vec2, Vec3};
-use darn_lab::scarffolds::sheets::Sheet;
+use darn_lab::scarffolds::sheets::SimulatedSheet;
 use darn_mend::ScanSession;
 
 use super::cloth::{ROUND, holed, laid, mended, mender, packed, read, sheet};
@@ -23,7 +23,7 @@ struct Edited {
 }
 
 impl Edited {
-    fn of(sheet: &Sheet) -> Edited {
+    fn of(sheet: &SimulatedSheet) -> Edited {
         let scan = read(&packed(&holed(sheet, &ROUND).mesh, &[]));
         let session = ScanSession::open(
             scan,
@@ -214,7 +214,7 @@ fn a_hard_anchor_is_met_or_refused_with_the_numbers() {
         .call(Cancellation::NEVER)
         .positions(&anchored(vec![soft, far])))
     .unwrap_err();
-    assert_eq!(error.code(), "anchor_out_of_reach");
+    assert_eq!(error.code().word, "anchor_out_of_reach");
     assert_eq!(error.fields()[0].pointer, "/anchors/1");
     assert!(error.fields()[0].detail.contains("beyond"), "{error}");
 

@@ -3,22 +3,22 @@
 use darn_contract::Constraints;
 use darn_geometry::mesh::loops::LoopKind;
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
-use darn_lab::scarffolds::scanned::Hole;
+use darn_lab::scarffolds::holed_scan::HoleShape;
 use darn_mend::{NetworkMender, mend};
 use darn_net::Networks;
 use nalgebra::Rotation3;
 
 use super::cloth::{ROUND, Seen, WEIGHTS, area, holed, laid, mended, network, packed, read, sheet};
 
-fn holes() -> [Hole; 3] {
+fn holes() -> [HoleShape; 3] {
     let centre = Vec2::new(0.47, 0.52);
     [
         ROUND,
-        Hole::Blob {
+        HoleShape::Blob {
             centre,
             radius: 0.15,
         },
-        Hole::Slit {
+        HoleShape::Slit {
             centre,
             length: 0.22,
             width: 0.045,
@@ -147,7 +147,7 @@ fn texture_coordinates_go_on_through_the_patch() {
             .bytes,
     );
     let part = after.scan.parts.iter().find(|p| p.reconstructed).unwrap();
-    let Hole::Circle { centre, radius } = ROUND else {
+    let HoleShape::Circle { centre, radius } = ROUND else {
         unreachable!()
     };
     let mut inside = 0;
@@ -205,5 +205,5 @@ fn a_scan_that_is_mended_has_nothing_left_to_mend() {
     )
     .unwrap();
     let second = mended(&first.bytes, &Constraints::default()).unwrap_err();
-    assert_eq!(second.code(), "no_holes");
+    assert_eq!(second.code().word, "no_holes");
 }

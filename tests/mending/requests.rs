@@ -6,7 +6,7 @@ use darn_contract::port::Cancellation;
 use darn_contract::{Anchor, Constraints, Edit, Gesture, HoleSelector};
 use darn_geometry::mesh::intersect::intersections_with;
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
-use darn_lab::scarffolds::scanned::Hole;
+use darn_lab::scarffolds::holed_scan::HoleShape;
 use darn_mend::{Call, MendError, MendLimits, NetworkMender, mend};
 use darn_net::Networks;
 
@@ -57,7 +57,7 @@ fn all_holes_are_filled_by_default_and_one_by_id_or_place() {
 fn a_hole_that_is_not_there_is_named() {
     let bytes = packed(&holed(sheet(0), &ROUND).mesh, &[]);
     let error = mended(&bytes, &asking(&[HoleSelector::Id(7)])).unwrap_err();
-    assert_eq!(error.code(), "constraints_do_not_fit");
+    assert_eq!(error.code().word, "constraints_do_not_fit");
     assert_eq!(error.fields()[0].pointer, "/holes/0");
     assert!(
         error.fields()[0].detail.contains("there is no loop 7"),
@@ -91,13 +91,13 @@ fn the_outer_boundary_is_never_filled() {
 
 #[test]
 fn a_scan_without_holes_is_refused_and_its_loops_are_named() {
-    let none = Hole::Circle {
+    let none = HoleShape::Circle {
         centre: darn_geometry::mesh::Vec2::new(0.5, 0.5),
         radius: 0.0,
     };
     let bytes = packed(&holed(sheet(0), &none).mesh, &[]);
     let error = mended(&bytes, &Constraints::default()).unwrap_err();
-    assert_eq!(error.code(), "no_holes");
+    assert_eq!(error.code().word, "no_holes");
     assert!(
         error
             .to_string()
@@ -122,7 +122,7 @@ fn drawn_twice(glb: &[u8], members: &[(&str, serde_json::Value)]) -> Vec<u8> {
 fn a_hole_between_two_nodes_of_one_mesh_is_left() {
     // Half a sheet, half of a hole on its edge; the other half is its mirror image.
     let half = laid(|u, v| [u, v, 0.02 * (9.0 * v).sin()]);
-    let cut = Hole::Circle {
+    let cut = HoleShape::Circle {
         centre: Vec2::new(0.0, 0.5),
         radius: 0.15,
     };
@@ -233,7 +233,7 @@ fn more_holes_than_are_filled_at_once_are_refused() {
     };
     let scan = read(&pair());
     let error = mend(&scan, &Constraints::default(), &mender).unwrap_err();
-    assert_eq!(error.code(), "too_many_holes");
+    assert_eq!(error.code().word, "too_many_holes");
     assert!(error.to_string().contains("2 holes"), "{error}");
 }
 

@@ -1,4 +1,4 @@
-//! The anchor search at both doors.
+//! The anchor search over HTTP and gRPC.
 
 use darn_contract::v1::{AnchorQuery, Constraints, ScanChunk, darn_client::DarnClient};
 use reqwest::{
@@ -8,20 +8,21 @@ use reqwest::{
 use serde_json::Value;
 use tonic::{Code, codegen::tokio_stream};
 
+use crate::fake::{Behaviour, FakeScan};
 use crate::harness::{Service, problem};
 
 const QUERY: &str = r#"{"target": [0.25, 0, 0], "map": true}"#;
 
-fn search(service: &Service, scan: &'static str, query: &'static str) -> RequestBuilder {
+fn search(service: &Service, scan: impl Into<FakeScan>, query: &'static str) -> RequestBuilder {
     let query = Part::text(query).mime_str("application/json").unwrap();
     let form = Form::new()
-        .part("scan", Part::bytes(scan.as_bytes()))
+        .part("scan", Part::bytes(scan.into().bytes()))
         .part("query", query);
     service.post("/optimize-anchor").multipart(form)
 }
 
 #[tokio::test]
-async fn a_point_is_found_or_mended_as_the_caller_would_have_it() {
+async fn the_answer_is_a_place_or_a_mended_scan_as_accept_says() {
     let service = Service::start(&[]).await;
     let response = search(&service, "cloth", QUERY).send().await.unwrap();
     assert_eq!(response.status(), 200);
@@ -35,11 +36,14 @@ async fn a_point_is_found_or_mended_as_the_caller_would_have_it() {
     assert_eq!(mended.headers()["content-type"], "model/gltf-binary");
     assert_eq!(mended.headers()["darn-anchor-distance"], "0.25");
     assert_eq!(mended.headers()["darn-holes-filled"], "1");
-    assert_eq!(mended.bytes().await.unwrap(), "glTF cloth");
+    assert_eq!(
+        mended.bytes().await.unwrap(),
+        FakeScan::named("cloth").mended()
+    );
 }
 
 #[tokio::test]
-async fn a_search_is_refused_with_its_place() {
+async fn a_refused_search_names_the_field() {
     let service = Service::start(&[]).await;
     let scan = Part::bytes(b"cloth".as_slice());
     let constraints = Part::text("{}").mime_str("application/json").unwrap();
@@ -63,7 +67,10 @@ async fn a_search_is_refused_with_its_place() {
             "search_invalid",
             search(&service, "cloth", r#"{"start": [0.5, 2], "hole": 1}"#),
         ),
-        ("search_of_a_cone", search(&service, "cone", QUERY)),
+        (
+            "search_of_a_cone",
+            search(&service, Behaviour::RefuseNotADisk, QUERY),
+        ),
     ];
     for (name, request) in cases {
         let document = problem(request.send().await.unwrap()).await;
@@ -92,19 +99,21 @@ fn query(target: &[f64]) -> Option<AnchorQuery> {
 async fn grpc_searches_with_the_query_of_the_first_chunk() {
     let service = Service::start(&[]).await;
     let mut client = DarnClient::connect(service.url("")).await.unwrap();
+    let scan = FakeScan::named("cloth").bytes();
+    let (head, tail) = scan.split_at(scan.len() / 2);
     let first = ScanChunk {
         query: query(&[0.25, 0.0, 0.0]),
-        data: "clo".into(),
+        data: head.to_vec().into(),
         ..Default::default()
     };
     let more = ScanChunk {
-        data: "th".into(),
+        data: tail.to_vec().into(),
         ..Default::default()
     };
     let asked = chunks(vec![first.clone(), more.clone()]);
     let found = client.optimize_anchor(asked).await.unwrap().into_inner();
     assert_eq!((found.hole, found.distance), (2, 0.25));
-    assert!(service.fake.seen().contains(&"cloth".to_owned()));
+    assert!(service.fake.saw("cloth"));
 
     let constrained = ScanChunk {
         constraints: Some(Constraints::default()),

@@ -1,4 +1,4 @@
-//! Every refusal: its status, its document, and the service going on.
+//! Every refusal over HTTP: its status and document, and that the service keeps working.
 
 use std::time::Duration;
 
@@ -8,10 +8,11 @@ use tokio::{
     net::TcpStream,
 };
 
+use crate::fake::{Behaviour, FakeScan};
 use crate::harness::{Service, problem};
 
 fn form(constraints: &'static str) -> Form {
-    let scan = Part::bytes(b"cloth".as_slice()).file_name("a.glb");
+    let scan = Part::bytes(FakeScan::named("cloth").bytes()).file_name("a.glb");
     let constraints = Part::text(constraints)
         .mime_str("application/json")
         .unwrap();
@@ -23,7 +24,6 @@ fn form(constraints: &'static str) -> Form {
 #[tokio::test]
 async fn refusals_are_problem_documents() {
     let service = Service::start(&["--body-limit", "1KiB"]).await;
-    let glb = |body: &'static str| service.scan(body);
     let asked = |constraints| service.post("/inpaint").multipart(form(constraints));
     let cases = [
         ("not_found", service.post("/nope")),
@@ -31,7 +31,7 @@ async fn refusals_are_problem_documents() {
             "method_not_allowed",
             service.get("/inpaint").header("x-request-id", "test"),
         ),
-        ("empty_body", glb("")),
+        ("empty_body", service.scan("cloth").body("")),
         ("no_content_type", service.post("/inpaint").body("cloth")),
         (
             "wrong_content_type",
@@ -72,12 +72,15 @@ async fn refusals_are_problem_documents() {
             "holes_with_constraints",
             service.post("/holes").multipart(form("{}")),
         ),
-        ("truncated_scan", glb("truncated")),
-        ("huge_scan", glb("huge")),
-        ("geometry", glb("cone")),
-        ("unknown_hole", glb("unknown hole")),
-        ("internal_is_opaque", glb("secret")),
-        ("panic", glb("panic")),
+        ("truncated_scan", service.scan(Behaviour::RefuseTruncated)),
+        ("huge_scan", service.scan(Behaviour::RefuseHuge)),
+        ("geometry", service.scan(Behaviour::RefuseNotADisk)),
+        ("unknown_hole", service.scan(Behaviour::RefuseUnknownHole)),
+        (
+            "internal_is_opaque",
+            service.scan(Behaviour::FailInternally),
+        ),
+        ("panic", service.scan(Behaviour::Panic)),
     ];
     for (name, request) in cases {
         let response = request.send().await.unwrap();
@@ -89,14 +92,14 @@ async fn refusals_are_problem_documents() {
 }
 
 #[tokio::test]
-async fn a_wrong_method_learns_the_right_one() {
+async fn a_wrong_method_is_answered_with_the_allowed_ones() {
     let service = Service::start(&[]).await;
     let response = service.get("/inpaint").send().await.unwrap();
     assert_eq!(response.headers()["allow"], "POST");
 }
 
 #[tokio::test]
-async fn an_id_that_is_not_plain_is_replaced() {
+async fn a_request_id_with_other_characters_is_replaced() {
     let service = Service::start(&[]).await;
     let response = service
         .get("/nope")
@@ -113,7 +116,7 @@ async fn an_id_that_is_not_plain_is_replaced() {
 }
 
 #[tokio::test]
-async fn a_body_over_the_limit_is_read_on_so_that_the_answer_is_seen() {
+async fn a_client_that_sends_too_much_receives_the_answer() {
     let service = Service::start(&["--body-limit", "1MiB"]).await;
     let body = vec![7_u8; 3 << 20];
     let sized = service
@@ -125,7 +128,7 @@ async fn a_body_over_the_limit_is_read_on_so_that_the_answer_is_seen() {
         format!("{:#}", problem(sized.send().await.unwrap()).await)
     );
 
-    // The same without a length announced: the limit is found out on the way.
+    // Without a declared length the limit applies while the body is read.
     let mut stream = TcpStream::connect(service.address).await.unwrap();
     stream
         .write_all(b"POST /holes HTTP/1.1\r\nhost: x\r\ncontent-type: model/gltf-binary\r\ntransfer-encoding: chunked\r\n\r\n")
@@ -146,7 +149,7 @@ async fn a_body_over_the_limit_is_read_on_so_that_the_answer_is_seen() {
 }
 
 #[tokio::test]
-async fn a_body_that_stops_coming_is_given_up() {
+async fn a_body_that_stops_coming_times_out() {
     let service = Service::start(&["--body-timeout", "50ms"]).await;
     let mut stream = TcpStream::connect(service.address).await.unwrap();
     stream

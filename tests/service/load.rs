@@ -1,4 +1,4 @@
-//! Queue, deadline, callers who leave, shutdown.
+//! The queue, the deadline, callers who leave, fairness, shutdown.
 
 use std::{
     sync::{
@@ -8,14 +8,15 @@ use std::{
     time::{Duration, Instant},
 };
 
+use crate::fake::{Behaviour, FakeScan};
 use crate::harness::{Service, problem, until};
 
 #[tokio::test]
 async fn a_full_queue_refuses_with_an_estimate() {
     let service = Service::start(&["--workers", "1", "--queue", "1"]).await;
-    let running = tokio::spawn(service.scan("hold 1").send());
-    service.fake.wait_for("hold 1").await;
-    let waiting = tokio::spawn(service.scan("hold 2").send());
+    let running = tokio::spawn(service.scan(FakeScan::holding("first")).send());
+    service.fake.wait_for_scan("first").await;
+    let waiting = tokio::spawn(service.scan(FakeScan::holding("second")).send());
     until(|| async { service.metric("darn_jobs{state=\"waiting\"}").await == Some(1.0) }).await;
 
     let refused = service.scan("cloth").send().await.unwrap();
@@ -37,8 +38,8 @@ async fn a_full_queue_refuses_with_an_estimate() {
 #[tokio::test]
 async fn the_deadline_covers_waiting_and_running() {
     let service = Service::start(&["--workers", "1", "--deadline", "300ms"]).await;
-    let running = tokio::spawn(service.scan("hold").send());
-    service.fake.wait_for("hold").await;
+    let running = tokio::spawn(service.scan(FakeScan::holding("held")).send());
+    service.fake.wait_for_scan("held").await;
     let begun = Instant::now();
     let waited = service.scan("waits").send().await.unwrap();
     assert!(
@@ -50,26 +51,23 @@ async fn the_deadline_covers_waiting_and_running() {
 
     service.fake.release();
     assert_eq!(service.scan("cloth").send().await.unwrap().status(), 200);
-    assert!(
-        !service.fake.seen().contains(&"waits".to_owned()),
-        "an expired job ran"
-    );
+    assert!(!service.fake.saw("waits"), "an expired job ran");
 }
 
 #[tokio::test]
-async fn a_caller_who_left_costs_no_work() {
+async fn a_job_whose_caller_left_does_not_run() {
     let service = Service::start(&["--workers", "1"]).await;
-    let running = tokio::spawn(service.scan("hold").send());
-    service.fake.wait_for("hold").await;
+    let running = tokio::spawn(service.scan(FakeScan::holding("held")).send());
+    service.fake.wait_for_scan("held").await;
     let leaving = tokio::spawn(service.scan("leaves").send());
     until(|| async { service.metric("darn_jobs{state=\"waiting\"}").await == Some(1.0) }).await;
     leaving.abort();
-    // The place in the queue is given up when the server sees the connection close; nothing tells a test of it but time.
+    // The place is free once the server sees the closed connection, which a test cannot observe.
     tokio::time::sleep(Duration::from_millis(200)).await;
     service.fake.release();
     assert_eq!(running.await.unwrap().unwrap().status(), 200);
     assert_eq!(service.scan("cloth").send().await.unwrap().status(), 200);
-    assert!(!service.fake.seen().contains(&"leaves".to_owned()));
+    assert!(!service.fake.saw("leaves"));
     assert_eq!(
         service.metric("darn_jobs_total{end=\"skipped\"}").await,
         Some(1.0)
@@ -81,16 +79,16 @@ async fn no_caller_starves() {
     const REQUESTS: usize = 200;
     let service = Arc::new(Service::start(&["--workers", "1", "--queue", "8"]).await);
     let edit = format!("{}/inpaint", service.session("cloth").await);
-    let slow = r#"{"anchors": [{"hole": 6, "position": [0, 0, 0]}]}"#;
-    // Two send scans, two edit the same session; each asks again as soon as it is answered.
+    service.fake.every_edit(Behaviour::TakeTime);
+    // Two send scans, two edit the same session; each sends the next request as soon as it is answered.
     let answered: Arc<[AtomicUsize; 4]> = Arc::default();
     let callers = (0..4).map(|caller| {
         let (service, edit, answered) = (service.clone(), edit.clone(), answered.clone());
         tokio::spawn(async move {
             while answered.iter().map(|n| n.load(Relaxed)).sum::<usize>() < REQUESTS {
                 let request = match caller {
-                    0 | 1 => service.scan("slow"),
-                    _ => service.ask(&edit, slow),
+                    0 | 1 => service.scan(Behaviour::TakeTime),
+                    _ => service.ask(&edit, "{}"),
                 };
                 assert_eq!(request.send().await.unwrap().status(), 200);
                 answered[caller].fetch_add(1, Relaxed);
@@ -101,16 +99,16 @@ async fn no_caller_starves() {
         caller.await.unwrap();
     }
     for caller in answered.iter() {
-        // A sixth is what two that share a session get of one worker.
+        // Two callers who share a session get a sixth of one worker each.
         assert!(caller.load(Relaxed) > REQUESTS / 12, "{answered:?}");
     }
 }
 
 #[tokio::test]
-async fn a_shutdown_lets_running_work_end() {
+async fn a_shutdown_waits_for_running_jobs() {
     let service = Service::start(&["--workers", "1"]).await;
-    let running = tokio::spawn(service.scan("hold").send());
-    service.fake.wait_for("hold").await;
+    let running = tokio::spawn(service.scan(FakeScan::holding("held")).send());
+    service.fake.wait_for_scan("held").await;
     service.stop.cancel();
     service.fake.release();
     assert_eq!(running.await.unwrap().unwrap().status(), 200);
@@ -118,10 +116,10 @@ async fn a_shutdown_lets_running_work_end() {
 }
 
 #[tokio::test]
-async fn a_shutdown_is_bounded() {
+async fn a_shutdown_waits_no_longer_than_the_drain() {
     let service = Service::start(&["--workers", "1", "--drain", "100ms"]).await;
-    let running = tokio::spawn(service.scan("hold").send());
-    service.fake.wait_for("hold").await;
+    let running = tokio::spawn(service.scan(FakeScan::holding("held")).send());
+    service.fake.wait_for_scan("held").await;
     service.stop.cancel();
     let ended = tokio::time::timeout(Duration::from_secs(10), service.ended).await;
     ended.expect("the drain was not bounded").unwrap().unwrap();

@@ -1,11 +1,12 @@
-//! The service through its real router on a real socket, mending replaced by a fake that fails on demand.
+//! The service with its real router on a real socket, around a fake mender that behaves as each test says.
 
 mod anchors;
-mod doors;
+mod fake;
 mod faults;
 mod harness;
 mod load;
 mod openapi;
+mod protocols;
 mod sessions;
 mod signals;
 mod uploads;

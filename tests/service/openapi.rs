@@ -1,4 +1,4 @@
-//! The committed OpenAPI document is the one served.
+//! The OpenAPI document: the committed copy, its references, and its paths.
 
 use serde_json::Value;
 

@@ -1,4 +1,4 @@
-//! Scans kept for editing: what goes right, what is refused, and who goes when memory or patience is out.
+//! Sessions: editing, refusals, eviction, expiry, exclusive use, shutdown.
 
 use std::time::Duration;
 
@@ -12,14 +12,15 @@ use serde_json::{Value, json};
 use tower::ServiceExt as _;
 use uuid::Uuid;
 
+use crate::fake::{Behaviour, FakeScan};
 use crate::harness::{Service, problem, until};
 
-/// An anchor at `x`, on a hole that says what happens.
-fn anchor(hole: u32, x: f64) -> String {
-    json!({ "anchors": [{ "hole": hole, "uv": [0.5, 0.5], "position": [x, 0, 0] }] }).to_string()
+/// Constraints with an anchor at `x`, which is how the fake mender tells edits apart.
+fn edit_at(x: f64) -> String {
+    json!({ "anchors": [{ "hole": 2, "uv": [0.5, 0.5], "position": [x, 0, 0] }] }).to_string()
 }
 
-/// Waits until so many requests use sessions or wait for their turn.
+/// Waits until so many requests use a session or wait for it.
 async fn under_way(service: &Service, requests: f64) {
     until(|| async { service.metric("darn_session_requests").await == Some(requests) }).await;
 }
@@ -53,13 +54,13 @@ async fn a_session_is_opened_edited_and_ended() {
     assert_eq!(unedited.text().await.unwrap(), "glTF cloth []");
 
     let edit = format!("{path}/inpaint");
-    let patches = service.ask(&edit, anchor(2, 0.5)).send().await.unwrap();
+    let patches = service.ask(&edit, edit_at(0.5)).send().await.unwrap();
     assert_eq!(patches.status(), 200);
     assert_eq!(patches.headers()["content-type"], "model/gltf-binary");
     assert_eq!(patches.headers()["darn-anchor-distance"], "0.5");
     assert_eq!(patches.bytes().await.unwrap(), "glTF patches");
 
-    let positions = service.ask(&edit, anchor(2, 0.75));
+    let positions = service.ask(&edit, edit_at(0.75));
     let positions = positions.header("accept", "application/octet-stream");
     let positions = positions.send().await.unwrap();
     assert_eq!(
@@ -72,18 +73,19 @@ async fn a_session_is_opened_edited_and_ended() {
         .collect();
     assert_eq!(positions.bytes().await.unwrap(), numbers);
 
-    let both = service.ask(&edit, anchor(2, 0.75));
+    let both = service.ask(&edit, edit_at(0.75));
     let both = both.header("accept", "multipart/mixed").send().await;
     let text = both.unwrap().text().await.unwrap();
     assert!(text.contains("name=\"report\"") && text.contains("1 anchors"));
     assert!(text.contains("name=\"patches\"") && text.contains("glTF patches"));
 
-    // The result is that of the constraints met last; a refusal leaves them.
-    let refused = service.ask(&edit, anchor(9, 3.0)).send().await.unwrap();
+    // The result has the constraints of the last successful edit.
+    service.fake.next_edit(Behaviour::RefuseNotADisk);
+    let refused = service.ask(&edit, edit_at(3.0)).send().await.unwrap();
     assert_eq!(code(refused).await, (422, "not_a_disk".to_owned()));
     let edited = service.get(&result).send().await.unwrap();
     assert_eq!(edited.text().await.unwrap(), "glTF cloth [0.75]");
-    // No body: no constraints.
+    // No body means no constraints.
     let none = service.post(&edit).send().await.unwrap();
     assert_eq!(none.status(), 200);
     assert!(!none.headers().contains_key("darn-anchor-distance"));
@@ -118,7 +120,7 @@ async fn refusals_of_sessions_are_problem_documents() {
     let opening = |constraints: &'static str| {
         let constraints = Part::text(constraints).mime_str("application/json");
         let form = Form::new()
-            .part("scan", Part::bytes(b"cloth".as_slice()))
+            .part("scan", Part::bytes(FakeScan::named("cloth").bytes()))
             .part("constraints", constraints.unwrap());
         service.post("/sessions").multipart(form)
     };
@@ -130,8 +132,11 @@ async fn refusals_of_sessions_are_problem_documents() {
                 r#"{"anchors": [{"uv": [0, 0], "position": [0, 0, 0]}], "holes": [{"id": 2}]}"#,
             ),
         ),
-        ("session_of_a_cone", service.open("cone")),
-        ("session_too_large", service.open("65536 bytes")),
+        ("session_of_a_cone", service.open(Behaviour::RefuseNotADisk)),
+        (
+            "session_too_large",
+            service.open(FakeScan::named("large").keeping(65_536)),
+        ),
         ("session_not_found", get(&nobody)),
         ("session_id_is_none", get("/sessions/%ff")),
         (
@@ -171,20 +176,23 @@ async fn refusals_of_sessions_are_problem_documents() {
             "session_search_invalid",
             service.ask(&search, r#"{"target": [0]}"#),
         ),
-        ("session_panic", service.ask(&edit, anchor(8, 0.0))),
+        ("session_panic", service.ask(&edit, edit_at(0.0))),
         ("session_method", service.delete(&edit)),
     ];
     for (name, request) in cases {
+        if name == "session_panic" {
+            service.fake.next_edit(Behaviour::Panic);
+        }
         let response = request.send().await.unwrap();
         let document = format!("{:#}", problem(response).await);
         insta::assert_snapshot!(name, document);
-        let next = service.ask(&edit, anchor(2, 1.0)).send().await.unwrap();
+        let next = service.ask(&edit, edit_at(1.0)).send().await.unwrap();
         assert_eq!(next.status(), 200, "after {name}");
     }
 }
 
 #[tokio::test]
-async fn what_was_not_used_for_longest_goes_when_memory_is_short() {
+async fn the_least_recently_used_session_is_evicted() {
     let service = Service::start(&["--session-memory", "35000B"]).await;
     let first = service.session("cloth").await;
     let second = service.session("cloth").await;
@@ -202,13 +210,19 @@ async fn what_was_not_used_for_longest_goes_when_memory_is_short() {
 }
 
 #[tokio::test]
-async fn a_thousand_sessions_abandoned_stay_under_the_cap() {
+async fn a_thousand_abandoned_sessions_stay_below_the_memory_limit() {
     const CAP: f64 = 1_048_576.0;
     let service = Service::start(&["--session-memory", "1MiB"]).await;
-    let first = service.session("10000 first").await;
+    let first = service.session("first").await;
     for i in 0..125 {
         let batch: Vec<_> = (0..8)
-            .map(|j| tokio::spawn(service.open(format!("{} of {i}", 5000 + 1000 * j)).send()))
+            .map(|j| {
+                tokio::spawn(
+                    service
+                        .open(FakeScan::named("cloth").keeping(5000 + 1000 * j))
+                        .send(),
+                )
+            })
             .collect();
         for opened in batch {
             assert_eq!(opened.await.unwrap().unwrap().status(), 201);
@@ -240,50 +254,44 @@ async fn an_idle_session_expires() {
 }
 
 #[tokio::test]
-async fn requests_to_one_session_take_turns_and_hold_up_nobody_else() {
+async fn requests_to_one_session_wait_for_each_other_and_block_no_others() {
     let service = Service::start(&["--workers", "2", "--queue", "1"]).await;
     let path = service.session("cloth").await;
     let edit = format!("{path}/inpaint");
-    let held = tokio::spawn(service.ask(&edit, anchor(7, 1.0)).send());
-    service.fake.wait_for("hold 1").await;
+    service.fake.next_edit(Behaviour::Hold);
+    let held = tokio::spawn(service.ask(&edit, edit_at(1.0)).send());
+    service.fake.wait_for_edit(1.0).await;
     let mut waiting = Vec::new();
     for x in [2.0, 3.0, 4.0] {
-        waiting.push(tokio::spawn(service.ask(&edit, anchor(2, x)).send()));
+        waiting.push(tokio::spawn(service.ask(&edit, edit_at(x)).send()));
         under_way(&service, x).await;
     }
-    let one_more = service.ask(&edit, anchor(2, 5.0)).send().await.unwrap();
+    let one_more = service.ask(&edit, edit_at(5.0)).send().await.unwrap();
     assert_eq!(one_more.headers()["retry-after"], "1");
     assert_eq!(code(one_more).await, (429, "session_busy".to_owned()));
 
-    // Three wait for their turn, and one worker and the whole queue are free for others.
+    // Three wait for the session; one worker and the whole queue are free for others.
     assert_eq!(service.scan("cloth").send().await.unwrap().status(), 200);
     let other = service.session("cloth").await;
     assert_eq!(service.get(&other).send().await.unwrap().status(), 200);
-    assert!(
-        !service
-            .fake
-            .seen()
-            .iter()
-            .any(|text| text.starts_with("move"))
-    );
+    assert_eq!(service.fake.edits(), [1.0]);
 
     service.fake.release();
     assert_eq!(held.await.unwrap().unwrap().status(), 200);
     for request in waiting {
         assert_eq!(request.await.unwrap().unwrap().status(), 200);
     }
-    let moved: Vec<String> = service.fake.seen();
-    let moved = moved.into_iter().filter(|text| text.starts_with("move"));
-    assert_eq!(moved.collect::<Vec<_>>(), ["move 2", "move 3", "move 4"]);
+    assert_eq!(service.fake.edits(), [1.0, 2.0, 3.0, 4.0]);
 }
 
 #[tokio::test]
-async fn a_session_in_use_outlives_eviction_and_its_deletion_waits_for_its_jobs() {
+async fn a_session_in_use_is_not_evicted_and_is_freed_after_its_jobs() {
     let service = Service::start(&["--workers", "2", "--session-memory", "16KiB"]).await;
     let path = service.session("cloth").await;
     let edit = format!("{path}/inpaint");
-    let held = tokio::spawn(service.ask(&edit, anchor(7, 1.0)).send());
-    service.fake.wait_for("hold 1").await;
+    service.fake.next_edit(Behaviour::Hold);
+    let held = tokio::spawn(service.ask(&edit, edit_at(1.0)).send());
+    service.fake.wait_for_edit(1.0).await;
 
     let refused = service.open("cloth").send().await.unwrap();
     assert!(refused.headers().contains_key("retry-after"));
@@ -300,64 +308,67 @@ async fn a_session_in_use_outlives_eviction_and_its_deletion_waits_for_its_jobs(
 }
 
 #[tokio::test]
-async fn the_deadline_covers_waiting_for_a_turn() {
+async fn the_deadline_covers_waiting_for_the_session() {
     let service = Service::start(&["--workers", "2", "--deadline", "300ms"]).await;
     let path = service.session("cloth").await;
     let edit = format!("{path}/inpaint");
-    let held = tokio::spawn(service.ask(&edit, anchor(7, 1.0)).send());
-    service.fake.wait_for("hold 1").await;
-    let waited = service.ask(&edit, anchor(2, 2.0)).send().await.unwrap();
+    service.fake.next_edit(Behaviour::Hold);
+    let held = tokio::spawn(service.ask(&edit, edit_at(1.0)).send());
+    service.fake.wait_for_edit(1.0).await;
+    let waited = service.ask(&edit, edit_at(2.0)).send().await.unwrap();
     assert_eq!(code(waited).await, (504, "deadline_exceeded".to_owned()));
     let held = held.await.unwrap().unwrap();
     assert_eq!(code(held).await, (504, "deadline_exceeded".to_owned()));
-    // The job whose caller was sent away still has the session; then the next may.
+    // The job whose caller was refused still uses the session; the next request waits for it.
     service.fake.release();
     until(|| async {
-        let next = service.ask(&edit, anchor(2, 3.0)).send().await.unwrap();
+        let next = service.ask(&edit, edit_at(3.0)).send().await.unwrap();
         next.status() == 200
     })
     .await;
-    assert!(!service.fake.seen().contains(&"move 2".to_owned()));
+    assert!(!service.fake.edits().contains(&2.0));
 }
 
 #[tokio::test]
-async fn a_caller_who_left_keeps_neither_turn_nor_scan() {
+async fn a_caller_who_left_keeps_neither_the_session_nor_a_scan() {
     let service = Service::start(&["--workers", "2"]).await;
     let path = service.session("cloth").await;
     let edit = format!("{path}/inpaint");
-    let held = tokio::spawn(service.ask(&edit, anchor(7, 1.0)).send());
-    service.fake.wait_for("hold 1").await;
-    let leaving = tokio::spawn(service.ask(&edit, anchor(2, 2.0)).send());
+    service.fake.next_edit(Behaviour::Hold);
+    let held = tokio::spawn(service.ask(&edit, edit_at(1.0)).send());
+    service.fake.wait_for_edit(1.0).await;
+    let leaving = tokio::spawn(service.ask(&edit, edit_at(2.0)).send());
     under_way(&service, 2.0).await;
     leaving.abort();
     under_way(&service, 1.0).await;
-    let opening = tokio::spawn(service.open("hold opening").send());
-    service.fake.wait_for("hold opening").await;
+    let opening = tokio::spawn(service.open(FakeScan::holding("opening")).send());
+    service.fake.wait_for_scan("opening").await;
     opening.abort();
-    // The service sees the connection close; nothing tells a test of it but time.
+    // The service must see the closed connection, which a test cannot observe.
     tokio::time::sleep(Duration::from_millis(200)).await;
     service.fake.release();
     assert_eq!(held.await.unwrap().unwrap().status(), 200);
-    let next = service.ask(&edit, anchor(2, 3.0)).send().await.unwrap();
+    let next = service.ask(&edit, edit_at(3.0)).send().await.unwrap();
     assert_eq!(next.status(), 200);
-    assert!(!service.fake.seen().contains(&"move 2".to_owned()));
+    assert!(!service.fake.edits().contains(&2.0));
     until(|| async { service.fake.kept() == 1 }).await;
     assert_eq!(service.metric("darn_sessions").await, Some(1.0));
 }
 
 #[tokio::test]
-async fn a_shutdown_answers_sessions_like_the_rest() {
+async fn a_shutdown_refuses_requests_to_sessions() {
     let service = Service::start(&["--workers", "2"]).await;
     let path = service.session("cloth").await;
     let edit = format!("{path}/inpaint");
-    let held = tokio::spawn(service.ask(&edit, anchor(7, 1.0)).send());
-    service.fake.wait_for("hold 1").await;
-    let waiting = tokio::spawn(service.ask(&edit, anchor(2, 2.0)).send());
+    service.fake.next_edit(Behaviour::Hold);
+    let held = tokio::spawn(service.ask(&edit, edit_at(1.0)).send());
+    service.fake.wait_for_edit(1.0).await;
+    let waiting = tokio::spawn(service.ask(&edit, edit_at(2.0)).send());
     under_way(&service, 2.0).await;
     let app = service.app.clone();
     service.stop.cancel();
     until(|| async { app.ready().is_err() }).await;
-    // A drain takes no new connections, so the router is asked without one.
+    // A drain accepts no new connections, so the router is called without one.
     for (method, path) in [
         (Method::GET, path.clone()),
         (Method::POST, edit),

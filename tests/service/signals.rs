@@ -1,4 +1,4 @@
-//! Signals, sent to a service in a process of its own: this very test program, run again.
+//! Signals, sent to a service in another process: this test program, started again.
 
 use std::{
     io::{Read, Write},
@@ -11,19 +11,20 @@ use std::{
 use clap::Parser;
 use darn_serve::{healthcheck, run};
 
-use crate::harness::{Fake, Settings};
+use crate::fake::{FakeMender, FakeScan};
+use crate::harness::Settings;
 
 const ADDRESS: &str = "DARN_TEST_SIGNALS_ADDRESS";
-const PATIENCE: Duration = Duration::from_secs(10);
+const TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Not a test: what the other process does.
+/// Not a test: what the other process runs.
 #[test]
 #[ignore = "run by the test of signals"]
 fn serves_until_signalled() {
     if let Ok(address) = std::env::var(ADDRESS) {
         let settings = ["darn", "--listen", &address, "--drain", "60s"];
         let settings = Settings::parse_from(settings).serve;
-        run(&settings, Arc::new(Fake::default())).unwrap();
+        run(&settings, Arc::new(FakeMender::default())).unwrap();
     }
 }
 
@@ -66,16 +67,21 @@ fn a_second_signal_ends_the_service_at_once() {
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    let end = Instant::now() + PATIENCE;
-    while healthcheck(address, PATIENCE).is_err() {
+    let end = Instant::now() + TIMEOUT;
+    while healthcheck(address, TIMEOUT).is_err() {
         assert!(Instant::now() < end, "the service never was ready");
         std::thread::sleep(Duration::from_millis(10));
     }
 
-    // Work under way, which holds the drain.
+    // A running job, which the drain waits for.
     let mut held = TcpStream::connect(address).unwrap();
-    held.write_all(b"POST /inpaint HTTP/1.1\r\nhost: x\r\ncontent-type: model/gltf-binary\r\ncontent-length: 4\r\n\r\nhold")
-        .unwrap();
+    let scan = FakeScan::holding("held").bytes();
+    let head = format!(
+        "POST /inpaint HTTP/1.1\r\nhost: x\r\ncontent-type: model/gltf-binary\r\ncontent-length: {}\r\n\r\n",
+        scan.len()
+    );
+    held.write_all(head.as_bytes()).unwrap();
+    held.write_all(&scan).unwrap();
     while !metrics(address).contains("darn_jobs{state=\"running\"} 1") {
         assert!(Instant::now() < end, "the work never began");
         std::thread::sleep(Duration::from_millis(10));
@@ -85,7 +91,7 @@ fn a_second_signal_ends_the_service_at_once() {
     if !early {
         signal(&child);
     }
-    let ended = ends(&mut child, PATIENCE);
+    let ended = ends(&mut child, TIMEOUT);
     child.kill().ok();
     child.wait().unwrap();
     assert!(!early, "one signal cut the work off");

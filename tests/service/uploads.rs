@@ -1,4 +1,4 @@
-//! Bodies: how large, how slow, how many at once, and as what they are sent.
+//! Request bodies: size, speed, number at once, media types; and connections whose peer is silent.
 
 use std::time::{Duration, Instant};
 
@@ -12,9 +12,9 @@ use tokio::{
 
 use crate::harness::{Service, Settings, problem};
 
-const PATIENCE: Duration = Duration::from_secs(10);
+const TIMEOUT: Duration = Duration::from_secs(10);
 
-/// A request of which `body` bytes are announced and three come.
+/// A request that declares a body of `body` bytes and sends three of them.
 async fn stalled(service: &Service, body: u64) -> TcpStream {
     let head = format!(
         "POST /inpaint HTTP/1.1\r\nhost: x\r\ncontent-type: model/gltf-binary\r\ncontent-length: {body}\r\n\r\nclo"
@@ -27,7 +27,7 @@ async fn stalled(service: &Service, body: u64) -> TcpStream {
 /// The status line's first twelve bytes.
 async fn status(stream: &mut TcpStream) -> String {
     let mut answer = [0; 12];
-    let read = timeout(PATIENCE, stream.read_exact(&mut answer)).await;
+    let read = timeout(TIMEOUT, stream.read_exact(&mut answer)).await;
     read.expect("no answer").unwrap();
     String::from_utf8_lossy(&answer).into_owned()
 }
@@ -59,7 +59,7 @@ async fn constraints_have_a_limit_of_their_own() {
 }
 
 #[tokio::test]
-async fn constraints_are_read_as_curl_sends_a_file() {
+async fn constraints_are_read_as_curl_sends_files() {
     let service = Service::start(&[]).await;
     let send = async |constraints: &str, media| {
         let form = form(b"cloth".to_vec(), constraints.into(), media);
@@ -78,7 +78,7 @@ async fn constraints_are_read_as_curl_sends_a_file() {
 }
 
 #[tokio::test]
-async fn a_compressed_body_is_refused_as_such() {
+async fn a_compressed_body_is_refused() {
     let service = Service::start(&[]).await;
     let plain = service.scan("cloth").header("content-encoding", "identity");
     assert_eq!(plain.send().await.unwrap().status(), 200);
@@ -89,7 +89,7 @@ async fn a_compressed_body_is_refused_as_such() {
 }
 
 #[tokio::test]
-async fn a_body_announced_too_large_is_refused_at_once() {
+async fn a_body_declared_too_large_is_refused_at_once() {
     let service = Service::start(&["--body-limit", "1KiB"]).await;
     let begun = Instant::now();
     let mut stream = stalled(&service, 1 << 40).await;
@@ -101,13 +101,13 @@ async fn a_body_announced_too_large_is_refused_at_once() {
 }
 
 #[tokio::test]
-async fn stalled_uploads_cost_no_place_in_the_queue() {
+async fn stalled_uploads_take_no_place_in_the_queue() {
     let service = Service::start(&["--workers", "1", "--queue", "1"]).await;
     let mut streams = Vec::new();
     for _ in 0..6 {
         streams.push(stalled(&service, 9).await);
     }
-    // Nothing tells a test that the service has begun to read them, but time.
+    // A test cannot observe that the service has begun to read them.
     tokio::time::sleep(Duration::from_millis(200)).await;
     assert_eq!(service.scan("cloth").send().await.unwrap().status(), 200);
     streams[0].write_all(b"th 123").await.unwrap();
@@ -115,10 +115,10 @@ async fn stalled_uploads_cost_no_place_in_the_queue() {
 }
 
 #[tokio::test]
-async fn uploads_are_bounded_and_the_refusal_says_by_what() {
+async fn uploads_are_bounded_and_the_refusal_names_the_setting() {
     let service = Service::start(&["--uploads", "2"]).await;
     let streams = [stalled(&service, 9).await, stalled(&service, 9).await];
-    let end = Instant::now() + PATIENCE;
+    let end = Instant::now() + TIMEOUT;
     let refused = loop {
         let answer = service.scan("cloth").send().await.unwrap();
         if answer.status() != 200 {
@@ -132,12 +132,15 @@ async fn uploads_are_bounded_and_the_refusal_says_by_what() {
 
     drop(streams);
     while service.scan("cloth").send().await.unwrap().status() != 200 {
-        assert!(Instant::now() < end, "uploads given up keep their right");
+        assert!(
+            Instant::now() < end,
+            "closed connections keep their upload permits"
+        );
     }
 }
 
 #[tokio::test]
-async fn a_shutdown_waits_for_uploads_that_come_on_and_only_so_long_for_others() {
+async fn a_shutdown_waits_for_uploads_and_times_out_stalled_ones() {
     let service = Service::start(&["--body-timeout", "1s", "--drain", "60s"]).await;
     let mut comes = stalled(&service, 9).await;
     let mut stalls = stalled(&service, 9).await;
@@ -147,7 +150,7 @@ async fn a_shutdown_waits_for_uploads_that_come_on_and_only_so_long_for_others()
     comes.write_all(b"th 123").await.unwrap();
     assert_eq!(status(&mut comes).await, "HTTP/1.1 200");
     assert_eq!(status(&mut stalls).await, "HTTP/1.1 408");
-    let ended = timeout(PATIENCE, service.ended).await;
+    let ended = timeout(TIMEOUT, service.ended).await;
     ended.expect("the drain was held").unwrap().unwrap();
 }
 
@@ -174,7 +177,7 @@ fn settings_out_of_bounds_are_refused_by_name() {
 }
 
 #[tokio::test]
-async fn who_says_nothing_is_let_go() {
+async fn a_silent_connection_is_closed() {
     let service = Service::start(&["--body-timeout", "300ms"]).await;
     let answered = b"GET /livez HTTP/1.1\r\nhost: x\r\n\r\n".as_slice();
     let cases = [
@@ -188,16 +191,16 @@ async fn who_says_nothing_is_let_go() {
         let mut stream = TcpStream::connect(service.address).await.unwrap();
         stream.write_all(begun).await.unwrap();
         let mut answer = Vec::new();
-        let ended = timeout(PATIENCE, stream.read_to_end(&mut answer)).await;
-        // Closed or reset, but over.
+        let ended = timeout(TIMEOUT, stream.read_to_end(&mut answer)).await;
+        // Closed or reset.
         ended.expect("still open").ok();
         assert_eq!(answer.starts_with(b"HTTP/1.1 200"), begun == answered);
     }
 }
 
 #[tokio::test]
-async fn who_takes_no_answer_is_let_go() {
-    // More than the sockets between them hold.
+async fn a_connection_that_reads_no_answer_is_closed() {
+    // More than the buffers of both sockets hold.
     const SCAN: usize = 32 << 20;
     let service = Service::start(&["--body-timeout", "300ms"]).await;
     let head = format!(
@@ -209,7 +212,7 @@ async fn who_takes_no_answer_is_let_go() {
     assert_eq!(status(&mut stream).await, "HTTP/1.1 200");
     tokio::time::sleep(Duration::from_secs(2)).await;
     let mut rest = Vec::new();
-    let ended = timeout(PATIENCE, stream.read_to_end(&mut rest)).await;
+    let ended = timeout(TIMEOUT, stream.read_to_end(&mut rest)).await;
     ended.expect("still open").ok();
-    assert!(rest.len() < SCAN, "the whole answer was kept for it");
+    assert!(rest.len() < SCAN, "the whole answer was sent");
 }

@@ -1,8 +1,8 @@
-//! Reads a message from its canonical proto3 JSON and says where it is wrong.
+//! Reads a message from its canonical proto3 JSON and reports the JSON pointer of an error.
 //!
-//! The generated deserializers name what they did not expect, but not where; and they buffer numbers in a way that
-//! serde_json's `arbitrary_precision` (which `scan` needs) breaks. So the text is parsed to a value first, and the value is
-//! walked by a deserializer of its own, which hands out plain numbers and keeps the JSON pointer of the fault.
+//! The generated deserializers say what they did not expect, but not where; and serde_json's `arbitrary_precision`, which reading glTF
+//! needs, breaks the way they buffer numbers. So the text is first parsed to a value; a deserializer written here then walks
+//! the value, hands out plain numbers and records the path to an error.
 
 use std::fmt;
 
@@ -14,7 +14,7 @@ use serde_json::{Map, Value};
 
 use super::FieldError;
 
-/// Why a text is not a message.
+/// Why a text was not read as a message.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum JsonError {
     /// The text is not JSON.
@@ -23,55 +23,56 @@ pub enum JsonError {
         /// What is wrong, with line and column.
         detail: String,
     },
-    /// The text is JSON of another shape.
+    /// The text is JSON, but not of this message.
     #[error("{0}")]
     Shape(FieldError),
 }
 
-/// Reads a message; unknown fields are refused.
+/// Reads a message; unknown fields are errors.
 ///
 /// # Errors
-/// `Syntax` when the text is not JSON, `Shape` with the place when it is not such a message.
+/// [`JsonError::Syntax`] when the text is not JSON, [`JsonError::Shape`] with a pointer when it is not such a message.
 pub fn from_json<T: DeserializeOwned>(text: &[u8]) -> Result<T, JsonError> {
     let value = darn_json::value(text).map_err(|error| JsonError::Syntax {
         detail: error.to_string(),
     })?;
-    T::deserialize(Node::bare(&value)).map_err(|fault| JsonError::Shape(fault.into_field_error()))
+    T::deserialize(ValueReader::element(&value))
+        .map_err(|error| JsonError::Shape(error.into_field_error()))
 }
 
-/// A fault and the way to it, innermost step first.
+/// An error and the path to it, innermost step first.
 #[derive(Debug)]
-struct Fault {
+struct PathError {
     detail: String,
     steps: Vec<String>,
 }
 
-impl Fault {
+impl PathError {
     fn under(mut self, step: impl Into<String>) -> Self {
         self.steps.push(step.into());
         self
     }
 
     fn into_field_error(self) -> FieldError {
-        let pointer = self.steps.iter().rev().fold(String::new(), |way, step| {
-            way + "/" + &step.replace('~', "~0").replace('/', "~1")
+        let pointer = self.steps.iter().rev().fold(String::new(), |path, step| {
+            path + "/" + &step.replace('~', "~0").replace('/', "~1")
         });
         FieldError::new(pointer, self.detail)
     }
 }
 
-impl fmt::Display for Fault {
+impl fmt::Display for PathError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.detail)
     }
 }
 
-impl std::error::Error for Fault {}
+impl std::error::Error for PathError {}
 
-impl serde::de::Error for Fault {
+impl serde::de::Error for PathError {
     fn custom<T: fmt::Display>(detail: T) -> Self {
         let mut detail = detail.to_string();
-        // What serde says of an untagged enum tells a caller nothing; the generated code uses one for every number.
+        // The generated code reads every number through an untagged enum, whose message from serde does not help a caller.
         if detail.starts_with("data did not match any variant") {
             detail = "expected a number of this field's range".to_owned();
         }
@@ -81,7 +82,7 @@ impl serde::de::Error for Fault {
         }
     }
 
-    /// In the words of JSON; serde's are Rust's.
+    /// Names JSON types, where serde names Rust types.
     fn invalid_type(unexpected: Unexpected<'_>, expected: &dyn Expected) -> Self {
         let got = match unexpected {
             Unexpected::Unit | Unexpected::Option => "null".to_owned(),
@@ -104,47 +105,48 @@ impl serde::de::Error for Fault {
     }
 }
 
-/// One value, read as it describes itself.
-struct Node<'v> {
+/// Deserializes one JSON value by its own type.
+struct ValueReader<'v> {
     value: &'v Value,
-    /// What null is here: in proto3 JSON a field that is null is absent; anywhere else null is itself.
-    null: Null,
+    /// How null is read here.
+    null: NullReading,
 }
 
+/// How null is read: in proto3 JSON a field that is null counts as absent; anywhere else null is a value.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Null {
-    Itself,
+enum NullReading {
+    Value,
     Absent,
 }
 
-impl<'v> Node<'v> {
-    fn bare(value: &'v Value) -> Self {
-        let null = Null::Itself;
+impl<'v> ValueReader<'v> {
+    fn element(value: &'v Value) -> Self {
+        let null = NullReading::Value;
         Self { value, null }
     }
 
     fn field(value: &'v Value) -> Self {
-        let null = Null::Absent;
+        let null = NullReading::Absent;
         Self { value, null }
     }
 
     fn is_absent(&self) -> bool {
-        self.value.is_null() && self.null == Null::Absent
+        self.value.is_null() && self.null == NullReading::Absent
     }
 }
 
-/// The natural or negative number a real one equals: proto3 JSON lets an integer be written `1.0`. Beyond 2^53 a real number
-/// no longer tells which integer is meant.
+/// The integer that a real number equals: proto3 JSON allows an integer to be written `1.0`. Beyond 2^53 a real number no longer
+/// identifies one integer.
 fn whole(real: f64) -> Option<i64> {
     let exact = real.fract() == 0.0 && real.abs() <= 9_007_199_254_740_992.0;
-    // Minus zero is no integer.
+    // Minus zero is not an integer.
     (exact && !(real == 0.0 && real.is_sign_negative())).then_some(real as i64)
 }
 
-impl<'de> Deserializer<'de> for Node<'_> {
-    type Error = Fault;
+impl<'de> Deserializer<'de> for ValueReader<'_> {
+    type Error = PathError;
 
-    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, PathError> {
         match self.value {
             Value::Null => visitor.visit_unit(),
             Value::Bool(flag) => visitor.visit_bool(*flag),
@@ -163,30 +165,30 @@ impl<'de> Deserializer<'de> for Node<'_> {
                         None => visitor.visit_f64(real),
                     }
                 } else {
-                    Err(Fault::custom("the number is out of range"))
+                    Err(PathError::custom("the number is out of range"))
                 }
             }
-            Value::Array(items) => visitor.visit_seq(Items {
+            Value::Array(items) => visitor.visit_seq(ArrayReader {
                 rest: items.iter(),
                 index: 0,
             }),
-            Value::Object(fields) => visitor.visit_map(Fields {
+            Value::Object(fields) => visitor.visit_map(ObjectReader {
                 rest: fields.iter(),
                 pending: None,
             }),
         }
     }
 
-    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+    fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, PathError> {
         match self.value {
             Value::Null => visitor.visit_none(),
             _ => visitor.visit_some(self),
         }
     }
 
-    fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+    fn deserialize_seq<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, PathError> {
         if self.is_absent() {
-            return visitor.visit_seq(Items {
+            return visitor.visit_seq(ArrayReader {
                 rest: [].iter(),
                 index: 0,
             });
@@ -194,7 +196,7 @@ impl<'de> Deserializer<'de> for Node<'_> {
         self.deserialize_any(visitor)
     }
 
-    fn deserialize_bool<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Fault> {
+    fn deserialize_bool<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, PathError> {
         if self.is_absent() {
             return visitor.visit_bool(false);
         }
@@ -205,7 +207,7 @@ impl<'de> Deserializer<'de> for Node<'_> {
         self,
         _name: &'static str,
         visitor: V,
-    ) -> Result<V::Value, Fault> {
+    ) -> Result<V::Value, PathError> {
         visitor.visit_newtype_struct(self)
     }
 
@@ -215,26 +217,26 @@ impl<'de> Deserializer<'de> for Node<'_> {
     }
 }
 
-struct Items<'v> {
+struct ArrayReader<'v> {
     rest: std::slice::Iter<'v, Value>,
     index: usize,
 }
 
-impl<'de> SeqAccess<'de> for Items<'_> {
-    type Error = Fault;
+impl<'de> SeqAccess<'de> for ArrayReader<'_> {
+    type Error = PathError;
 
     fn next_element_seed<T: DeserializeSeed<'de>>(
         &mut self,
         seed: T,
-    ) -> Result<Option<T::Value>, Fault> {
+    ) -> Result<Option<T::Value>, PathError> {
         let Some(value) = self.rest.next() else {
             return Ok(None);
         };
         let index = self.index;
         self.index += 1;
-        seed.deserialize(Node::bare(value))
+        seed.deserialize(ValueReader::element(value))
             .map(Some)
-            .map_err(|fault| fault.under(index.to_string()))
+            .map_err(|error| error.under(index.to_string()))
     }
 
     fn size_hint(&self) -> Option<usize> {
@@ -242,35 +244,35 @@ impl<'de> SeqAccess<'de> for Items<'_> {
     }
 }
 
-struct Fields<'v> {
+struct ObjectReader<'v> {
     rest: <&'v Map<String, Value> as IntoIterator>::IntoIter,
     pending: Option<(&'v str, &'v Value)>,
 }
 
-impl<'de> MapAccess<'de> for Fields<'_> {
-    type Error = Fault;
+impl<'de> MapAccess<'de> for ObjectReader<'_> {
+    type Error = PathError;
 
     fn next_key_seed<K: DeserializeSeed<'de>>(
         &mut self,
         seed: K,
-    ) -> Result<Option<K::Value>, Fault> {
+    ) -> Result<Option<K::Value>, PathError> {
         let Some((key, value)) = self.rest.next() else {
             return Ok(None);
         };
         self.pending = Some((key, value));
-        let name: StrDeserializer<'_, Fault> = key.as_str().into_deserializer();
+        let name: StrDeserializer<'_, PathError> = key.as_str().into_deserializer();
         seed.deserialize(name)
             .map(Some)
-            .map_err(|fault| fault.under(key))
+            .map_err(|error| error.under(key))
     }
 
-    fn next_value_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<S::Value, Fault> {
+    fn next_value_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<S::Value, PathError> {
         let (key, value) = self
             .pending
             .take()
-            .ok_or_else(|| Fault::custom("a value without its name"))?;
-        seed.deserialize(Node::field(value))
-            .map_err(|fault| fault.under(key))
+            .ok_or_else(|| PathError::custom("a value without its name"))?;
+        seed.deserialize(ValueReader::field(value))
+            .map_err(|error| error.under(key))
     }
 }
 
@@ -279,7 +281,7 @@ mod tests {
     use super::*;
     use crate::v1;
 
-    fn fault(text: &str) -> (String, String) {
+    fn shape_error(text: &str) -> (String, String) {
         match from_json::<v1::Constraints>(text.as_bytes()) {
             Err(JsonError::Shape(FieldError { pointer, detail })) => (pointer, detail),
             other => panic!("{text} gave {other:?}"),
@@ -287,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn the_example_of_the_design_is_read() {
+    fn constraints_of_every_kind_are_read_and_written() {
         let text = r#"{
             "holes":   [{"id": 2}, {"near": [0.1, 1.2, 0]}, {"cut": {"center": [0.4, 1.0, 0.1], "radius": 5e-2}}],
             "anchors": [{"hole": 2, "uv": [0.48, 0.52], "position": [0.11, 1.18, 0.02]},
@@ -313,30 +315,30 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_names_its_place() {
-        assert_eq!(fault(r#"{"hole": []}"#).0, "/hole");
+    fn an_error_has_the_pointer_of_its_place() {
+        assert_eq!(shape_error(r#"{"hole": []}"#).0, "/hole");
         assert_eq!(
-            fault(r#"{"holes": [{"id": 1}, {"i~/d": 2}]}"#).0,
+            shape_error(r#"{"holes": [{"id": 1}, {"i~/d": 2}]}"#).0,
             "/holes/1/i~0~1d"
         );
-        assert_eq!(fault(r#"{"holes": [{"id": -1}]}"#).0, "/holes/0/id");
+        assert_eq!(shape_error(r#"{"holes": [{"id": -1}]}"#).0, "/holes/0/id");
         assert_eq!(
-            fault(r#"{"anchors": [{"uv": [0.5, {}]}]}"#),
+            shape_error(r#"{"anchors": [{"uv": [0.5, {}]}]}"#),
             (
                 "/anchors/0/uv/1".into(),
                 "expected a number of this field's range".into()
             )
         );
         assert_eq!(
-            fault(r#"{"anchors": [{"uv": [0.5, 1e999]}]}"#).0,
+            shape_error(r#"{"anchors": [{"uv": [0.5, 1e999]}]}"#).0,
             "/anchors/0/uv/1"
         );
-        assert_eq!(fault("[1]").0, "");
-        assert!(fault(r#"{"hole": []}"#).1.contains("unknown field"));
+        assert_eq!(shape_error("[1]").0, "");
+        assert!(shape_error(r#"{"hole": []}"#).1.contains("unknown field"));
     }
 
     #[test]
-    fn null_is_absent_and_integers_may_have_a_point() {
+    fn a_null_field_is_absent_and_integers_may_have_a_decimal_point() {
         let text = r#"{"holes": null, "anchors": [{"hole": 2.0, "uv": null, "position": [1.0, -2.0, 5e-1], "hard": null}],
             "edits": null, "weights": null, "up": null}"#;
         let read: v1::Constraints = from_json(text.as_bytes()).unwrap();
@@ -361,20 +363,20 @@ mod tests {
             (r#"{"holes": [{"id": 1.5}]}"#, "/holes/0/id"),
             (r#"{"holes": [{"id": -1.0}]}"#, "/holes/0/id"),
         ] {
-            assert_eq!(fault(text).0, at, "{text}");
+            assert_eq!(shape_error(text).0, at, "{text}");
         }
         assert_eq!(
-            fault("null"),
+            shape_error("null"),
             (String::new(), "expected an object; got null".into())
         );
         assert_eq!(
-            fault(r#"{"holes": 7}"#).1,
+            shape_error(r#"{"holes": 7}"#).1,
             "expected an array; got the number 7"
         );
     }
 
     #[test]
-    fn a_text_that_is_not_json_is_told_apart() {
+    fn a_text_that_is_not_json_is_a_syntax_error() {
         for text in ["", "{", "{\"holes\": [}", "{} {}", "\u{0}"] {
             assert!(matches!(
                 from_json::<v1::Constraints>(text.as_bytes()),

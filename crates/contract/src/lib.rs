@@ -1,11 +1,16 @@
-//! The contract: the types generated from `proto/` and the one check of what a request asks, used by both doors.
-//! May use: prost, pbjson, serde. Lives here: messages, their JSON, their validation.
-//! May not live here: HTTP, gRPC servers, geometry, anything that knows what a scan is.
+//! What darn's parts and callers agree on: the messages generated from `proto/`, the check of a request's constraints and queries,
+//! the table of error codes, and the [`port`] through which the service asks for mends.
+//! May use: prost, pbjson, serde, tonic's generated-code support.
+//! May not live here: servers, geometry, anything that reads a scan.
 
+pub mod codes;
+mod error_chain;
 mod json;
 pub mod port;
 mod validate;
 
+pub use codes::Code;
+pub use error_chain::error_chain;
 pub use json::{JsonError, from_json};
 pub use validate::{Anchor, Constraints, Edit, FieldError, Gesture, HoleSelector, Search};
 

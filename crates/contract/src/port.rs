@@ -1,22 +1,24 @@
-//! The port: the trait through which a service asks for mends, and how refusals reach a caller.
+//! The port: the traits through which the service asks for mends, and the refusals it hands on to callers.
 //!
-//! The service knows no scan, mesh or network. It is given a [`Mender`] and hands its refusals on by class.
+//! The service knows no scan, mesh or network: it is given a [`Mender`].
 
 use std::fmt;
 
-use crate::{Constraints, FieldError, Search, v1};
+use bytes::Bytes;
 
-/// A mended scan and what was done to it.
+use crate::{Code, Constraints, FieldError, Search, codes, v1};
+
+/// A mended scan and its report.
 #[derive(Debug, Clone)]
 pub struct Mended {
-    /// The glTF, in the container of the input.
+    /// The glTF, in the container of the input: GLB or JSON.
     pub bytes: Vec<u8>,
     /// What was done.
     pub report: v1::Report,
 }
 
-/// The caller's cancellation check: whether the answer is still waited for. Cheap, and may be asked from any thread. Whoever mends asks it
-/// before each hole and each step of a search, and gives up with any refusal when the call was cancelled.
+/// The caller's cancellation check: whether the answer is still waited for. Cheap; may be called from any thread. A mender calls it
+/// before each hole and each step of a search; after a cancellation it returns any refusal, which nobody reads.
 #[derive(Clone, Copy)]
 pub struct Cancellation<'a> {
     cancelled: &'a (dyn Fn() -> bool + Sync),
@@ -28,7 +30,7 @@ impl<'a> Cancellation<'a> {
         cancelled: &|| false,
     };
 
-    /// A call that is cancelled once `cancelled` says so.
+    /// A call that is cancelled once `cancelled` returns true.
     pub fn new(cancelled: &'a (dyn Fn() -> bool + Sync)) -> Cancellation<'a> {
         Cancellation { cancelled }
     }
@@ -47,48 +49,49 @@ impl fmt::Debug for Cancellation<'_> {
     }
 }
 
-/// Mends scans. Called from many worker threads at once; every call blocks until it is done.
+/// Mends scans. Called from many worker threads at once; every call blocks until it is done. `scan` holds the bytes of a GLB, or of a
+/// glTF JSON with data URIs; they are shared with the request, not copied.
 pub trait Mender: Send + Sync + 'static {
-    /// Fills the holes asked for.
+    /// Fills the selected holes.
     ///
     /// # Errors
-    /// Why not.
+    /// The scan is not readable or not mendable, or the constraints do not fit it.
     fn inpaint(
         &self,
-        scan: &[u8],
+        scan: Bytes,
         constraints: &Constraints,
         cancellation: Cancellation<'_>,
     ) -> Result<Mended, Refusal>;
 
-    /// Searches where on a hole's grid a point in space belongs.
+    /// Searches the uv of a hole's grid at which an anchor takes the cloth closest to a point in scene space.
     ///
     /// # Errors
-    /// Why not.
+    /// As [`Mender::inpaint`], for the search.
     fn optimize_anchor(
         &self,
-        scan: &[u8],
+        scan: Bytes,
         search: &Search,
         cancellation: Cancellation<'_>,
     ) -> Result<v1::AnchorFound, Refusal>;
 
-    /// The same, and the hole mended with the anchor it found.
+    /// The same search, then mends the hole with the anchor found.
     ///
     /// # Errors
-    /// Why not.
+    /// As [`Mender::optimize_anchor`].
     fn mend_to_target(
         &self,
-        scan: &[u8],
+        scan: Bytes,
         search: &Search,
         cancellation: Cancellation<'_>,
     ) -> Result<Mended, Refusal>;
 
-    /// Keeps a scan, its holes laid flat, so that constraints alone can be sent from then on. The constraints choose holes and weights.
+    /// Reads a scan and flattens its holes once, so that later calls need constraints alone. `constraints` select holes and weights.
     ///
     /// # Errors
-    /// Why not.
+    /// As [`Mender::inpaint`].
     fn open(
         &self,
-        scan: &[u8],
+        scan: Bytes,
         constraints: &Constraints,
         cancellation: Cancellation<'_>,
     ) -> Result<Box<dyn EditSession>, Refusal>;
@@ -96,30 +99,30 @@ pub trait Mender: Send + Sync + 'static {
     /// Every boundary loop of a scan.
     ///
     /// # Errors
-    /// Why not.
-    fn find_holes(&self, scan: &[u8]) -> Result<v1::HolesReport, Refusal>;
+    /// The scan is not readable.
+    fn find_holes(&self, scan: Bytes) -> Result<v1::HolesReport, Refusal>;
 
-    /// One small mend, whole and real; the service is ready when it has succeeded.
+    /// Mends one small scan completely. The service is ready once it has succeeded.
     ///
     /// # Errors
-    /// Why the service can never be ready.
+    /// Any refusal: the service can never be ready.
     fn warm_up(&self) -> Result<(), Refusal>;
 }
 
-/// A scan that is kept for editing. Called from worker threads, from one at a time (but for `bytes`, once, before the first
-/// call); dropped on any thread that may block.
+/// A scan kept for editing. Its calls come from worker threads, one at a time (`bytes` is also called once before the first of them);
+/// it is dropped on a thread that may block.
 pub trait EditSession: Send + Sync + 'static {
-    /// What it is, for who opened it; `id` and `idle_seconds` are the service's to fill in.
+    /// The session as its opener sees it; the service fills in `id` and `idle_seconds`.
     fn described(&self) -> v1::Session;
 
-    /// Bytes of memory it holds, about; asked again after every call, since it may grow.
+    /// Memory held, in bytes, estimated. Read again after every call, since it may grow.
     fn bytes(&self) -> usize;
 
-    /// The patches alone for other anchors and edits. The constraints carry no holes, weights or `up`: those are the ones the
-    /// session was opened with.
+    /// The patches alone for these anchors and edits. The constraints carry no holes, weights or `up`: those were chosen when the
+    /// session was opened.
     ///
     /// # Errors
-    /// Why not.
+    /// The constraints do not fit the scan or cannot be met.
     fn patches(
         &self,
         constraints: &Constraints,
@@ -127,20 +130,20 @@ pub trait EditSession: Send + Sync + 'static {
         cancellation: Cancellation<'_>,
     ) -> Result<Patches, Refusal>;
 
-    /// The whole scan with the same constraints: the bytes that the stateless call would answer.
+    /// The whole scan mended with these anchors and edits: the bytes that the stateless [`Mender::inpaint`] returns.
     ///
     /// # Errors
-    /// Why not.
+    /// As [`EditSession::patches`].
     fn mended(
         &self,
         constraints: &Constraints,
         cancellation: Cancellation<'_>,
     ) -> Result<Mended, Refusal>;
 
-    /// Searches where on a hole's grid a point in space belongs.
+    /// The search of [`Mender::optimize_anchor`] on the kept scan.
     ///
     /// # Errors
-    /// Why not.
+    /// The query does not fit the scan.
     fn optimize_anchor(
         &self,
         search: &Search,
@@ -158,7 +161,7 @@ pub enum PatchForm {
     Positions,
 }
 
-/// Patches without their scan.
+/// Patches without their scan, and the report.
 #[derive(Debug, Clone)]
 pub struct Patches {
     /// In the form asked for.
@@ -171,25 +174,26 @@ pub struct Patches {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{code}: {detail}")]
 pub struct Refusal {
-    /// Whose fault it is, and of which kind.
-    pub class: Class,
-    /// Stable word for programs, such as `not_a_disk`.
-    pub code: &'static str,
-    /// What, where and which limit, for a person. Never shown to a caller when the class is `Internal`.
+    /// The kind of refusal.
+    pub code: Code,
+    /// What, where and which limit, for a person. Logged instead of sent when [`Refusal::is_internal`].
     pub detail: String,
-    /// The constraints it is about, if it is about constraints.
+    /// The constraints at fault, if any.
     pub fields: Vec<FieldError>,
 }
 
-/// Kinds of refusals.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Class {
-    /// The bytes are not a scan: truncated, not glTF, not JSON.
-    Malformed,
-    /// A limit of the service is exceeded by what the bytes decode to.
-    TooLarge,
-    /// A scan, but not one that can be mended as asked: geometry, extensions, constraints.
-    Unprocessable,
-    /// Our own fault.
-    Internal,
+impl Refusal {
+    /// A refusal that is not about constraints.
+    pub fn new(code: Code, detail: impl Into<String>) -> Self {
+        Self {
+            code,
+            detail: detail.into(),
+            fields: Vec::new(),
+        }
+    }
+
+    /// Whether the mender itself failed; callers are not told its details.
+    pub fn is_internal(&self) -> bool {
+        self.code == codes::INTERNAL
+    }
 }

@@ -1,20 +1,20 @@
-//! What a request asks, once it is known to make sense by itself: lengths, ranges, finiteness, and what this version serves.
+//! Checks constraints and anchor queries field by field: lengths, ranges, finiteness, and what this version serves.
 //!
-//! Whether a hole exists is not known here: that needs the scan.
+//! Whether a hole exists is checked by the mender, which has the scan.
 
 use super::v1;
 
-/// Most entries a list of constraints may have; far above any use, far below any harm.
-const MOST: usize = 4096;
-/// Largest coordinate: its square still fits the f32 positions of a glTF.
-const FARTHEST: f64 = 1e18;
-const LATER: &str = "not served by this version yet";
+/// Most entries of one list of constraints: far above any use, and cheap to check.
+const MAX_ENTRIES: usize = 4096;
+/// Largest absolute coordinate, in the scene's unit: its square still fits an f32, the type of a glTF's positions.
+const MAX_COORDINATE: f64 = 1e18;
+const NOT_SERVED: &str = "not served by this version yet";
 
 /// One field of a request and what is wrong with it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{pointer}{}{detail}", if .pointer.is_empty() { "" } else { ": " })]
 pub struct FieldError {
-    /// JSON pointer (RFC 6901) into the constraints; empty for the whole.
+    /// JSON pointer (RFC 6901) into the constraints or the query; empty for the whole.
     pub pointer: String,
     /// What is wrong, for a person.
     pub detail: String,
@@ -30,94 +30,94 @@ impl FieldError {
     }
 }
 
-/// What a request asks; the default asks for all holes.
+/// Checked constraints of a mend. The default selects all holes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Constraints {
-    /// The holes to fill, in the request's order (entry `i` is `/holes/i`); empty means all.
+    /// The holes to fill, in the request's order (entry `i` is `/holes/i`); empty selects all.
     pub holes: Vec<HoleSelector>,
     /// Points the new cloth should pass through (entry `i` is `/anchors/i`).
     pub anchors: Vec<Anchor>,
     /// Gestures on the new cloth, in order (entry `i` is `/edits/i`).
     pub edits: Vec<Edit>,
-    /// Name of the weights; none: the mender's choice.
+    /// Name of the weights; `None` leaves the choice to the mender.
     pub weights: Option<String>,
-    /// Direction against gravity, of any length but zero.
+    /// Direction opposite to gravity in scene space; any length above zero.
     pub up: Option<[f64; 3]>,
 }
 
-/// One hole.
+/// Selects one hole.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum HoleSelector {
-    /// By the loop's id.
+    /// The hole of this boundary loop id.
     Id(u32),
-    /// The hole whose rim comes nearest to a point in scene space.
+    /// The hole whose rim is nearest to this point in scene space.
     Near([f64; 3]),
 }
 
 /// A point the new cloth should pass through.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Anchor {
-    /// The id of its hole; none when one hole is filled.
+    /// The id of its hole; may be `None` when only one hole is filled.
     pub hole: Option<u32>,
-    /// Where on the hole's chart, each in [0, 1]; none: to be searched.
+    /// Its uv on the hole's chart, in [0, 1]²; `None` has it searched.
     pub uv: Option<[f64; 2]>,
-    /// Where in scene space.
+    /// Its position in scene space, in the scene's unit.
     pub position: [f64; 3],
-    /// Whether the cloth must pass through it.
+    /// Whether the mend fails unless the cloth passes through it.
     pub hard: bool,
 }
 
 /// A gesture on the new cloth of a hole.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Edit {
-    /// The id of its hole; none when one hole is filled.
+    /// The id of its hole; may be `None` when only one hole is filled.
     pub hole: Option<u32>,
-    /// What the hand does.
+    /// The deformation.
     pub gesture: Gesture,
 }
 
-/// What a hand does to cloth; uvs are in [0, 1]², offsets and axes in scene space.
+/// A deformation of the cloth of a hole. Uvs and radii are on the hole's chart, in [0, 1]; offsets and axes in scene space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Gesture {
     /// Pulls a point by an offset.
     Grab {
-        /// Where on the chart.
+        /// The point.
         uv: [f64; 2],
-        /// How far and where to.
+        /// Displacement, in the scene's unit.
         offset: [f64; 3],
     },
-    /// Turns a disk.
+    /// Rotates a disk.
     Twist {
-        /// Its centre on the chart.
+        /// Its centre.
         uv: [f64; 2],
-        /// Its radius on the chart, in (0, 1].
+        /// Its radius, in (0, 1].
         radius: f64,
-        /// Axis of the turn; not zero.
+        /// Axis of the rotation; any length above zero.
         axis: [f64; 3],
-        /// Angle of the turn, radians.
+        /// Angle of the rotation, in radians.
         angle: f64,
     },
     /// Draws two points together.
     Pinch {
-        /// The points on the chart.
+        /// The points.
         uvs: [[f64; 2]; 2],
-        /// How much of their distance to take away, in [0, 1].
+        /// The part of their distance to remove, in [0, 1].
         amount: f64,
     },
 }
 
-/// What an anchor search is asked.
+/// A checked query of an anchor search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Search {
-    /// The id of the hole; none when the scan has one.
+    /// The id of the hole; may be `None` when the scan has only one.
     pub hole: Option<u32>,
-    /// The point in scene space that the cloth should reach.
+    /// The point in scene space that the cloth should reach, in the scene's unit.
     pub target: [f64; 3],
-    /// Where the search starts, each in [0, 1]; none: where the unedited cloth is nearest.
+    /// The uv at which the search starts, in [0, 1]²; `None` starts where the unedited cloth is nearest.
     pub start: Option<[f64; 2]>,
-    /// Whether every cell is tried.
+    /// Whether every hole cell is evaluated.
     pub exhaustive: bool,
-    /// Whether the loss of every cell is answered.
+    /// Whether the answer carries the loss of every cell.
     pub map: bool,
 }
 
@@ -125,30 +125,30 @@ impl Constraints {
     /// Checks a message field by field.
     ///
     /// # Errors
-    /// Every field that is wrong or not served, in the message's order.
+    /// Every field that is invalid or not served yet, in the message's order.
     pub fn check(message: &v1::Constraints) -> Result<Self, Vec<FieldError>> {
-        let mut wrong = Wrong::default();
-        wrong.count("/holes", message.holes.len());
-        wrong.count("/anchors", message.anchors.len());
-        wrong.count("/edits", message.edits.len());
-        if !wrong.0.is_empty() {
-            return Err(wrong.0);
+        let mut errors = FieldErrors::default();
+        errors.count("/holes", message.holes.len());
+        errors.count("/anchors", message.anchors.len());
+        errors.count("/edits", message.edits.len());
+        if !errors.0.is_empty() {
+            return Err(errors.0);
         }
 
         let holes = (message.holes.iter().enumerate())
-            .filter_map(|(i, hole)| wrong.hole(&format!("/holes/{i}"), hole))
+            .filter_map(|(i, hole)| errors.hole(&format!("/holes/{i}"), hole))
             .collect();
         let anchors = (message.anchors.iter().enumerate())
-            .filter_map(|(i, anchor)| wrong.anchor(&format!("/anchors/{i}"), anchor))
+            .filter_map(|(i, anchor)| errors.anchor(&format!("/anchors/{i}"), anchor))
             .collect();
         let edits = (message.edits.iter().enumerate())
-            .filter_map(|(i, edit)| wrong.edit(&format!("/edits/{i}"), edit))
+            .filter_map(|(i, edit)| errors.edit(&format!("/edits/{i}"), edit))
             .collect();
         let up = match message.up.as_slice() {
             [] => None,
-            up => wrong.direction("/up", up),
+            up => errors.direction("/up", up),
         };
-        if wrong.0.is_empty() {
+        if errors.0.is_empty() {
             Ok(Self {
                 holes,
                 anchors,
@@ -157,7 +157,7 @@ impl Constraints {
                 up,
             })
         } else {
-            Err(wrong.0)
+            Err(errors.0)
         }
     }
 }
@@ -166,38 +166,42 @@ impl Search {
     /// Checks a message field by field.
     ///
     /// # Errors
-    /// Every field that is wrong, in the message's order.
+    /// Every invalid field, in the message's order.
     pub fn check(message: &v1::AnchorQuery) -> Result<Self, Vec<FieldError>> {
-        let mut wrong = Wrong::default();
-        let target = wrong.point("/target", &message.target);
+        let mut errors = FieldErrors::default();
+        let target = errors.point("/target", &message.target);
         let start = match message.start.as_slice() {
             [] => None,
-            start => wrong.uv("/start", start),
+            start => errors.uv("/start", start),
         };
         match target {
-            Some(target) if wrong.0.is_empty() => Ok(Self {
+            Some(target) if errors.0.is_empty() => Ok(Self {
                 hole: message.hole,
                 target,
                 start,
                 exhaustive: message.exhaustive,
                 map: message.map,
             }),
-            _ => Err(wrong.0),
+            _ => Err(errors.0),
         }
     }
 }
 
+/// Collects the errors of a message while its fields are read; a reader returns `None` after it has recorded an error.
 #[derive(Default)]
-struct Wrong(Vec<FieldError>);
+struct FieldErrors(Vec<FieldError>);
 
-impl Wrong {
-    fn say(&mut self, pointer: &str, detail: impl Into<String>) {
+impl FieldErrors {
+    fn push(&mut self, pointer: &str, detail: impl Into<String>) {
         self.0.push(FieldError::new(pointer, detail));
     }
 
     fn count(&mut self, pointer: &str, count: usize) {
-        if count > MOST {
-            self.say(pointer, format!("{count} entries; the limit is {MOST}"));
+        if count > MAX_ENTRIES {
+            self.push(
+                pointer,
+                format!("{count} entries; the limit is {MAX_ENTRIES}"),
+            );
         }
     }
 
@@ -208,11 +212,11 @@ impl Wrong {
                 .point(&format!("{at}/near"), near)
                 .map(HoleSelector::Near),
             (None, [], Some(_)) => {
-                self.say(&format!("{at}/cut"), LATER);
+                self.push(&format!("{at}/cut"), NOT_SERVED);
                 None
             }
             _ => {
-                self.say(at, "exactly one of `id`, `near` and `cut` says which hole");
+                self.push(at, "exactly one of `id`, `near` and `cut` says which hole");
                 None
             }
         }
@@ -235,7 +239,7 @@ impl Wrong {
     fn edit(&mut self, at: &str, edit: &v1::Edit) -> Option<Edit> {
         let gesture = match &edit.gesture {
             None => {
-                self.say(
+                self.push(
                     at,
                     "exactly one of `grab`, `twist` and `pinch` says what to do",
                 );
@@ -252,14 +256,15 @@ impl Wrong {
             }
             Some(v1::edit::Gesture::Twist(twist)) => {
                 let at = format!("{at}/twist");
-                let turn = |x: f64| x.is_finite();
-                let disk = |x: f64| x > 0.0 && x <= 1.0;
+                let is_angle = |x: f64| x.is_finite();
+                let is_radius = |x: f64| x > 0.0 && x <= 1.0;
                 let uv = self.uv(&format!("{at}/uv"), &twist.uv);
                 let expected = "expected a number above 0, at most 1";
-                let radius = self.number(&format!("{at}/radius"), twist.radius, disk, expected);
+                let radius =
+                    self.number(&format!("{at}/radius"), twist.radius, is_radius, expected);
                 let axis = self.direction(&format!("{at}/axis"), &twist.axis);
                 let expected = "expected a finite number of radians";
-                let angle = self.number(&format!("{at}/angle"), twist.angle, turn, expected);
+                let angle = self.number(&format!("{at}/angle"), twist.angle, is_angle, expected);
                 Gesture::Twist {
                     uv: uv?,
                     radius: radius?,
@@ -275,15 +280,15 @@ impl Wrong {
                     a.zip(b)
                 } else {
                     let count = pinch.uvs.len();
-                    self.say(
+                    self.push(
                         &format!("{at}/uvs"),
                         format!("expected two uvs; got {count}"),
                     );
                     None
                 };
-                let share = |x: f64| (0.0..=1.0).contains(&x);
+                let is_share = |x: f64| (0.0..=1.0).contains(&x);
                 let expected = "expected a number from 0 to 1";
-                let amount = self.number(&format!("{at}/amount"), pinch.amount, share, expected);
+                let amount = self.number(&format!("{at}/amount"), pinch.amount, is_share, expected);
                 let (a, b) = ends?;
                 Gesture::Pinch {
                     uvs: [a, b],
@@ -301,17 +306,17 @@ impl Wrong {
         &mut self,
         at: &str,
         number: Option<f64>,
-        fine: fn(f64) -> bool,
-        detail: &str,
+        is_valid: fn(f64) -> bool,
+        expected: &str,
     ) -> Option<f64> {
         match number {
-            Some(x) if fine(x) => Some(x),
+            Some(x) if is_valid(x) => Some(x),
             Some(x) => {
-                self.say(at, format!("{detail}; got {x}"));
+                self.push(at, format!("{expected}; got {x}"));
                 None
             }
             None => {
-                self.say(at, format!("{detail}; got none"));
+                self.push(at, format!("{expected}; got none"));
                 None
             }
         }
@@ -323,22 +328,22 @@ impl Wrong {
         if length2 > f64::MIN_POSITIVE {
             return Some(direction);
         }
-        self.say(at, "a direction has a length; got zero");
+        self.push(at, "a direction has a length; got zero");
         None
     }
 
     fn point(&mut self, at: &str, numbers: &[f64]) -> Option<[f64; 3]> {
         let Ok(point) = <[f64; 3]>::try_from(numbers) else {
-            self.say(
+            self.push(
                 at,
                 format!("a point is [x, y, z]; got {} numbers", numbers.len()),
             );
             return None;
         };
-        self.each(
+        self.all(
             at,
             &point,
-            |x| x.abs() <= FARTHEST,
+            |x| x.abs() <= MAX_COORDINATE,
             "expected a finite coordinate, at most 1e18 in size",
         )
         .then_some(point)
@@ -346,10 +351,10 @@ impl Wrong {
 
     fn uv(&mut self, at: &str, numbers: &[f64]) -> Option<[f64; 2]> {
         let Ok(uv) = <[f64; 2]>::try_from(numbers) else {
-            self.say(at, format!("a uv is [u, v]; got {} numbers", numbers.len()));
+            self.push(at, format!("a uv is [u, v]; got {} numbers", numbers.len()));
             return None;
         };
-        self.each(
+        self.all(
             at,
             &uv,
             |x| (0.0..=1.0).contains(&x),
@@ -358,19 +363,25 @@ impl Wrong {
         .then_some(uv)
     }
 
-    /// Whether every number is fine; NaN never is.
-    fn each(&mut self, at: &str, numbers: &[f64], fine: fn(f64) -> bool, detail: &str) -> bool {
+    /// Whether every number is valid; the predicates reject NaN.
+    fn all(
+        &mut self,
+        at: &str,
+        numbers: &[f64],
+        is_valid: fn(f64) -> bool,
+        expected: &str,
+    ) -> bool {
         let before = self.0.len();
         for (i, &number) in numbers.iter().enumerate() {
-            if !fine(number) {
-                self.say(&format!("{at}/{i}"), format!("{detail}; got {number}"));
+            if !is_valid(number) {
+                self.push(&format!("{at}/{i}"), format!("{expected}; got {number}"));
             }
         }
         self.0.len() == before
     }
 }
 
-/// The numbers of a JSON list; anything else in it is NaN, which no check lets pass.
+/// The numbers of a JSON list; any other value becomes NaN, which every check rejects.
 fn numbers(list: &pbjson_types::ListValue) -> Vec<f64> {
     use pbjson_types::value::Kind;
     let number = |value: &pbjson_types::Value| match value.kind {
@@ -394,7 +405,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_served_passes() {
+    fn valid_constraints_pass() {
         assert_eq!(check("{}"), Ok(Constraints::default()));
         let asked = check(
             r#"{"holes": [{"id": 0}, {"near": [1, 2, 3]}], "anchors": [{"uv": [0, 1], "position": [1, 2, 3]}]}"#,
@@ -415,7 +426,7 @@ mod tests {
     }
 
     #[test]
-    fn every_wrong_field_is_named() {
+    fn every_invalid_field_is_reported() {
         let text = r#"{
             "holes": [{}, {"id": 1, "near": [0, 0, 0]}, {"near": [0, 1]}, {"cut": {}}, {"near": ["NaN", 0, "Infinity"]}],
             "anchors": [{"uv": [0.5, 1.5], "position": [0, 0, 0]}, {"position": [0, 0, 0], "hard": true}, {"uv": [0, 0, 0]}],
@@ -449,7 +460,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_passes_is_finite_and_in_range(
+        fn values_that_pass_are_finite_and_in_range(
             uv in prop::collection::vec(prop::num::f64::ANY, 0..4),
             position in prop::collection::vec(prop::num::f64::ANY, 0..5),
         ) {

@@ -1,16 +1,16 @@
-//! A sparse symmetric positive definite matrix, factored once and solved many times (faer's supernodal Cholesky).
-//! Shared by all that solves on meshes and grids; knows nothing of either.
+//! Sparse symmetric positive definite matrices, factored once and solved many times (faer's supernodal Cholesky).
 
 use faer::linalg::solvers::SolveCore;
 use faer::sparse::linalg::solvers::Llt;
 use faer::sparse::{SparseColMat, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Side};
 
-/// The matrix was not positive definite (or not finite).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// A matrix could not be factored, or a solution is not finite.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the matrix is not positive definite or not finite")]
 pub(crate) struct NotPositive;
 
-/// Lower triangle of a symmetric matrix, as entries that add up.
+/// The lower triangle of a symmetric matrix as a list of entries; those at the same place add up.
 #[derive(Debug, Default)]
 pub(crate) struct Symmetric {
     size: usize,
@@ -19,7 +19,7 @@ pub(crate) struct Symmetric {
 }
 
 impl Symmetric {
-    /// The zero matrix of a size.
+    /// The zero matrix with `size` rows.
     pub fn zero(size: usize) -> Self {
         Symmetric {
             size,
@@ -39,7 +39,7 @@ impl Symmetric {
         self.add(i, j, -weight);
     }
 
-    /// Adds weight · (Σ cₖ xₖ)² to the quadratic form.
+    /// Adds weight · (Σ cₖ xₖ)² to the quadratic form; `row` holds pairs (k, cₖ).
     pub fn add_square(&mut self, row: &[(usize, f64)], weight: f64) {
         for (a, (i, ci)) in row.iter().enumerate() {
             for (j, cj) in &row[..=a] {
@@ -61,7 +61,7 @@ impl Symmetric {
         })
     }
 
-    /// The lower triangle in compressed columns, entries at one place added up in the order they came.
+    /// The lower triangle in compressed columns; entries at the same place are added up in the order of the list.
     fn columns(&self) -> SparseColMat<usize, f64> {
         let mut starts = vec![0; self.size + 1];
         for entry in &self.entries {
@@ -77,7 +77,7 @@ impl Symmetric {
             fill[column as usize] += 1;
         }
         let (mut ends, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
-        // Where in `values` the current column's entry of a row is.
+        // Per row the index in `values` of the current column's entry.
         let mut place = vec![usize::MAX; self.size];
         for s in starts.windows(2) {
             let first = rows.len();
@@ -105,14 +105,14 @@ impl Symmetric {
     }
 }
 
-/// The Cholesky factor of a `Symmetric`.
+/// The Cholesky factor of a [`Symmetric`].
 pub(crate) struct Factor {
     llt: Llt<usize, f64>,
     size: usize,
 }
 
 impl Factor {
-    /// Solves for K right-hand sides at once, in place.
+    /// Solves for K right-hand sides at once, in place: `rhs[i]` holds row i of all of them.
     ///
     /// # Errors
     /// `NotPositive` when the solution is not finite.
@@ -132,7 +132,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_chain_of_springs_hangs_evenly() {
+    fn the_vertices_of_a_chain_of_springs_are_evenly_spaced() {
         let mut springs = Symmetric::zero(3);
         springs.add(0, 0, 1.0);
         springs.add_spring(0, 1, 1.0);

@@ -1,12 +1,12 @@
-//! The grid: 64×64 samples of a chart, what of it is known, and the units the network sees.
-//! Cell (i, j) has its centre at uv ((i + ½)/64, (j + ½)/64); u runs right along i, v up along j; index j·64 + i.
-//! No meshes, no network, no constraints: those rooms read and write grids.
+//! The grid: 64×64 samples of a chart, which of them are known, and the network's units.
+//!
+//! Cell (i, j) has index j·64 + i and its centre at uv ((i + ½)/64, (j + ½)/64); u grows with i, v with j.
 
 use crate::mesh::{Vec2, Vec3};
 
-/// Cells along one side of a grid.
+/// Number of cells along one side of a grid.
 pub const SIDE: usize = 64;
-/// Cells of a grid.
+/// Number of cells of a grid.
 pub const CELLS: usize = SIDE * SIDE;
 
 /// Positions sampled on the chart's unit square, in scene space.
@@ -14,7 +14,7 @@ pub const CELLS: usize = SIDE * SIDE;
 pub struct Grid {
     /// One position per cell; meaningless where `known` is false.
     pub positions: Vec<Vec3>,
-    /// Whether the scan covers the cell's centre; false in holes and outside the region alike.
+    /// Whether the scan covers the cell's centre; false in holes and outside the region.
     pub known: Vec<bool>,
 }
 
@@ -25,11 +25,12 @@ pub struct NormalGrid {
     pub positions: Vec<[f32; 3]>,
     /// 1 where the position is given, 0 where it is to be filled; values between are soft.
     pub known: Vec<f32>,
-    /// A smooth fill of what the scan alone knows, one position per cell, when it is at hand; anchors are told from it.
+    /// A smooth fill of the scan's known cells without anchors, one position per cell, if there is one; anchors are
+    /// found by comparing with it.
     pub base: Option<Vec<[f32; 3]>>,
 }
 
-/// The similarity between scene space and the network's units.
+/// The similarity transform between scene space and the network's units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Normalisation {
     /// Mean of the known positions, scene space.
@@ -50,11 +51,13 @@ pub struct Spacing {
 }
 
 /// The index of cell (i, j).
+#[inline]
 pub fn cell_index(i: usize, j: usize) -> usize {
     j * SIDE + i
 }
 
-/// The uv of the centre of a cell given by its index.
+/// The uv of the centre of the cell with this index.
+#[inline]
 pub fn cell_centre(index: usize) -> Vec2 {
     let half = 0.5 / SIDE as f64;
     Vec2::new(
@@ -63,13 +66,14 @@ pub fn cell_centre(index: usize) -> Vec2 {
     )
 }
 
-/// The cell that a uv lies in; uvs outside the unit square go to the nearest cell.
+/// The index of the cell that a uv lies in; the nearest cell for a uv outside the unit square.
+#[inline]
 pub fn cell_at(uv: Vec2) -> usize {
     let along = |x: f64| ((x * SIDE as f64).floor().max(0.0) as usize).min(SIDE - 1);
     cell_index(along(uv.x), along(uv.y))
 }
 
-/// The index pairs of all 4-neighbours, right ones before upper ones.
+/// The index pairs of all 4-neighbours: first the pairs along u, then those along v.
 pub fn neighbour_pairs() -> impl Iterator<Item = (usize, usize)> {
     let right = (0..CELLS)
         .filter(|k| k % SIDE + 1 < SIDE)
@@ -78,7 +82,7 @@ pub fn neighbour_pairs() -> impl Iterator<Item = (usize, usize)> {
     right.chain(upper)
 }
 
-/// Spacing of the 4-neighbours that `counted` admits.
+/// Spacing of the pairs of 4-neighbours for which `counted` is true.
 pub fn spacing(positions: &[Vec3], counted: impl Fn(usize, usize) -> bool) -> Spacing {
     let (mut sum, mut squares, mut pairs) = (0.0, 0.0, 0usize);
     for (a, b) in neighbour_pairs().filter(|&(a, b)| counted(a, b)) {
@@ -97,7 +101,7 @@ pub fn spacing(positions: &[Vec3], counted: impl Fn(usize, usize) -> bool) -> Sp
 }
 
 impl Grid {
-    /// A grid that knows nothing.
+    /// A grid without known cells.
     pub fn unknown() -> Self {
         Grid {
             positions: vec![Vec3::zeros(); CELLS],
@@ -110,8 +114,8 @@ impl Grid {
         self.known.iter().filter(|k| **k).count()
     }
 
-    /// Shift and scale that bring this grid to the network's units; `None` when no two neighbouring cells are known
-    /// or all known cells coincide.
+    /// The transform that brings this grid to the network's units; `None` when no two neighbouring cells are known or
+    /// all known cells coincide.
     pub fn normalisation(&self) -> Option<Normalisation> {
         let spacing = spacing(&self.positions, |a, b| self.known[a] && self.known[b]);
         if spacing.pairs == 0 || spacing.mean <= 0.0 || !spacing.mean.is_finite() {
@@ -140,7 +144,8 @@ impl Grid {
         }
     }
 
-    /// Positions of all cells: the scan's where known, `predicted` (network's units) elsewhere.
+    /// Positions of all cells in scene space: the scan's where known, `predicted` (one position per cell, network's
+    /// units) elsewhere.
     pub fn filled(&self, predicted: &[[f32; 3]], by: &Normalisation) -> Vec<Vec3> {
         self.positions
             .iter()
@@ -152,19 +157,22 @@ impl Grid {
 }
 
 impl Normalisation {
-    /// A scene position in the network's units.
+    /// A position in scene space, in the network's units.
+    #[inline]
     pub fn to_network(&self, p: &Vec3) -> [f32; 3] {
         let q = (p - self.centre) / self.scale;
         [q.x as f32, q.y as f32, q.z as f32]
     }
 
     /// A position in the network's units, in scene space.
+    #[inline]
     pub fn to_scene(&self, q: &[f32; 3]) -> Vec3 {
         Vec3::new(q[0].into(), q[1].into(), q[2].into()) * self.scale + self.centre
     }
 }
 
-/// Bicubic (Catmull–Rom) evaluation of per-cell positions at a uv; beyond the outermost cell centres it extrapolates linearly.
+/// Bicubic (Catmull–Rom) interpolation of positions, one per cell, at a uv; linear extrapolation beyond the outermost
+/// cell centres.
 pub fn evaluate(positions: &[Vec3], uv: Vec2) -> Vec3 {
     let (wu, iu) = catmull_rom(uv.x);
     let (wv, iv) = catmull_rom(uv.y);
@@ -177,7 +185,7 @@ pub fn evaluate(positions: &[Vec3], uv: Vec2) -> Vec3 {
     sum
 }
 
-/// Weights and cells of the four samples around `x` along one axis. Within half a cell of the border, where a neighbour is missing,
+/// Weights and cells of the four samples around `x` along one axis. Next to the border, where a sample is missing,
 /// the two nearest cells interpolate linearly.
 fn catmull_rom(x: f64) -> ([f64; 4], [usize; 4]) {
     let s = x * SIDE as f64 - 0.5;
@@ -217,7 +225,7 @@ mod tests {
         }
 
         #[test]
-        fn normalisation_is_undone_exactly_enough(scale in 1e-3..1e3f64, shift in -1e4..1e4f64) {
+        fn normalisation_is_undone_within_single_precision(scale in 1e-3..1e3f64, shift in -1e4..1e4f64) {
             let mut grid = Grid::unknown();
             grid.positions = plane(Vec3::repeat(shift), Vec3::x() * scale, Vec3::z() * scale);
             grid.known = (0..CELLS).map(|k| k % 7 != 3).collect();

@@ -1,8 +1,10 @@
-//! Triangle meshes, their flattening, and patches for their holes; small functions on plain arrays, in f64 and scene units.
+//! Triangle meshes, their flattening, and patches for their holes; small functions on plain arrays, in f64 and scene
+//! units.
 //!
-//! [`mesh`] welds triangles, finds boundary loops and grows regions; [`flatten`] lays a region flat (ARAP); [`grid`] is the chart sampled on
-//! 64×64 cells, [`smooth`] its smooth fills; [`patch`] meshes a filled grid into the hole's rim. This crate knows no glTF, no network and no
-//! HTTP, and none of the other crates.
+//! [`mesh`] welds triangles, finds boundary loops and grows regions; [`flatten`] lays a region flat (ARAP); [`grid`]
+//! is a chart sampled on 64×64 cells, [`smooth`] fills such grids smoothly; [`patch`] makes a mesh of a filled grid
+//! that fits the hole's rim. This crate depends on no other crate of the workspace: it knows no glTF, no network and
+//! no HTTP. `examples/flatten_a_sheet.rs` shows the first steps.
 
 mod cholesky;
 pub mod flatten;

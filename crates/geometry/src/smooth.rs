@@ -1,6 +1,8 @@
-//! Smooth fills of the grid, each the exact minimum of its energy: what a network sees in unknown cells, and what it has to beat.
-//! Fills are linear in the known positions, the same under the grid's symmetries, and turn with the cloth.
-//! Knows grids and the sparse factor; no cloth, no network.
+//! Smooth fills of the grid, each the exact minimum of an energy: the network's input in unknown cells, and its
+//! baselines.
+//!
+//! Fills are linear in the known positions, equivariant under the grid's symmetries and under rigid motions of the
+//! cloth.
 
 use serde::Serialize;
 
@@ -8,25 +10,28 @@ use crate::cholesky::Symmetric;
 use crate::grid::{CELLS, SIDE, neighbour_pairs};
 use crate::mesh::Vec3;
 
-/// Membrane beside the plate of [`Smooth::TautPlate`]: it takes over at lengths above 1 / √this, in cells.
+/// Weight of the membrane energy in [`Smooth::TautPlate`]. It dominates the plate at lengths above 1 / √weight = 15
+/// cells.
 const TENSION: f64 = 1.0 / (15.0 * 15.0);
 
-/// An energy of the grid, each coordinate by itself.
+/// An energy of the grid, the same for each coordinate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Smooth {
     /// Σ (first differences)²: the discrete harmonic fill.
     Membrane,
-    /// Σ x_uu² + 2 x_uv² + x_vv² of second differences: the discrete biharmonic fill, smooth across the rim.
+    /// Σ x_uu² + 2 x_uv² + x_vv² of second differences: the discrete biharmonic fill, with continuous slopes across
+    /// the rim.
     ThinPlate,
-    /// A thin plate under a little tension: smooth across the rim, and tame where it runs on beyond all known cells.
+    /// A thin plate under a little tension: continuous slopes across the rim, and no overshoot where it extrapolates
+    /// beyond all known cells.
     TautPlate,
 }
 
 /// A weighted difference of cells: Σ coefficient · position.
 struct Difference {
     weight: f64,
-    /// The first `count` count.
+    /// Pairs (cell, coefficient); the first `count` are used.
     terms: [(usize, f64); 4],
     count: usize,
 }
@@ -46,10 +51,10 @@ impl Difference {
     }
 }
 
-/// Positions with the hole filled to the least energy; cells neither known nor in the hole keep what they hold.
+/// The positions with the cells of the hole filled so that the energy is least; all other cells keep their positions.
 ///
-/// Differences that reach a cell neither known nor in the hole are left out. One sparse Cholesky factor, three right-hand sides.
-/// `None` when the known cells do not determine the fill.
+/// All three slices have one item per cell. Differences with a cell that is neither known nor in the hole are left
+/// out. One sparse Cholesky factor, three right-hand sides. `None` when the known cells do not determine the fill.
 pub fn smooth(
     positions: &[Vec3],
     known: &[bool],
@@ -59,7 +64,7 @@ pub fn smooth(
     smooth_all(&[positions], known, hole, energy)?.pop()
 }
 
-/// [`smooth`] for several sheets of which the same cells are known: the factor, which is most of the work, is theirs together.
+/// [`smooth`] for several sheets with the same known cells. They share the factor, which is most of the work.
 pub fn smooth_all(
     sheets: &[&[Vec3]],
     known: &[bool],
@@ -123,7 +128,7 @@ pub fn smooth_all(
     Some(filled.collect())
 }
 
-/// The second differences whose least cell is `k`: along u, along v, and mixed.
+/// The second differences whose cell of lowest index is `k`: along u, along v, and mixed.
 fn bendings(k: usize) -> impl Iterator<Item = Difference> {
     let (i, j) = (k % SIDE, k / SIDE);
     let straight =
@@ -164,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn a_taut_plate_bends_nearly_as_a_plate_does() {
+    fn a_taut_plate_is_closer_to_a_bent_surface_than_a_membrane() {
         let bent = |u: f64, v: f64| Vec3::new(u, v, (u - 0.5).powi(2) - 0.5 * v * v);
         let [membrane, taut] =
             [Smooth::Membrane, Smooth::TautPlate].map(|energy| worst(bent, energy));
@@ -174,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn sheets_are_filled_together_as_each_is_alone() {
+    fn sheets_filled_together_equal_sheets_filled_alone() {
         let (wave, known) = holed(|u, v| Vec3::new(u, v, 0.1 * (6.0 * u).sin() * (5.0 * v).cos()));
         let (bent, _) = holed(|u, v| Vec3::new(v, u, (u - 0.5).powi(2)));
         let hole: Vec<bool> = known.iter().map(|k| !k).collect();

@@ -1,13 +1,14 @@
-//! The accessor reader: component types × normalized × stride × sparse, every count checked against the bytes before memory is asked for.
+//! Reads accessors: all component types, normalized, strided, sparse. Every count is checked against the bytes before
+//! memory is allocated.
 
 use gltf::json::accessor::{BYTE, FLOAT, SHORT, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT};
 use gltf::json::accessor::{ComponentType, Type};
 
-use super::ScanError;
-use super::buffers::{Document, View};
-use super::json::Place;
+use super::buffers::{BufferView, Document};
+use super::error::ScanError;
+use super::json::JsonPlace;
 
-/// An accessor whose extent is known to lie inside its buffers.
+/// An accessor whose elements are known to lie inside its buffers.
 pub(super) struct Accessor<'d> {
     pub pointer: String,
     pub component: ComponentType,
@@ -15,17 +16,18 @@ pub(super) struct Accessor<'d> {
     pub count: usize,
     normalized: bool,
     base: Option<Elements<'d>>,
-    sparse: Option<Sparse<'d>>,
+    sparse: Option<SparseAccessor<'d>>,
 }
 
-/// Elements of one size at one distance.
+/// Elements of `size` bytes, `stride` bytes apart.
 struct Elements<'d> {
     bytes: &'d [u8],
     stride: usize,
     size: usize,
 }
 
-struct Sparse<'d> {
+/// The elements that a sparse accessor replaces, and their values.
+struct SparseAccessor<'d> {
     indices: Elements<'d>,
     component: ComponentType,
     values: Elements<'d>,
@@ -33,14 +35,14 @@ struct Sparse<'d> {
 }
 
 impl<'d> Accessor<'d> {
-    /// Opens the accessor at `place`. No element is decoded and nothing of its size allocated.
-    pub fn open<'a>(document: &'d Document<'a>, place: &Place<'a>) -> Result<Self, ScanError> {
+    /// Opens the accessor at `place`. Decodes no element and allocates nothing of its size.
+    pub fn open<'a>(document: &'d Document<'a>, place: &JsonPlace<'a>) -> Result<Self, ScanError> {
         let component = component(&place.need("componentType")?)?;
         let kind = kind(&place.need("type")?)?;
         let count_place = place.need("count")?;
         let count = count_place.integer()?;
         let size = component.size() * kind.multiplicity();
-        // Without a view it is zeros, which a sparse part may replace.
+        // Without a buffer view all elements are zero, except those that sparse values replace.
         let base = match place.get("bufferView")? {
             Some(view) => Some(elements(document.view(&view)?, place, count, size)?),
             None => None,
@@ -62,9 +64,11 @@ impl<'d> Accessor<'d> {
         })
     }
 
-    /// All elements as floats, `[count, N]`: normalized integers become [0, 1] or [−1, 1], others keep their value, and f32 its bits.
+    /// All elements as floats, `[count, N]`: normalized integers become [0, 1] or [−1, 1], other integers keep their
+    /// value, f32 keep their bits.
     ///
-    /// Components the accessor lacks take `fill`'s value; those beyond `N` are dropped. The caller has bounded `count`.
+    /// Components that the accessor lacks take `fill`'s value; those beyond `N` are dropped. The caller has checked
+    /// `count` against a limit.
     pub fn floats<const N: usize>(&self, fill: [f32; N]) -> Result<Vec<[f32; N]>, ScanError> {
         let step = self.component.size();
         let components = self.kind.multiplicity().min(N);
@@ -85,12 +89,12 @@ impl<'d> Accessor<'d> {
         self.collect(zero, read)
     }
 
-    /// All elements as unsigned integers; the caller has made sure that the type is SCALAR of an unsigned component.
+    /// All elements as unsigned integers. The caller has checked that the type is SCALAR and the component unsigned.
     pub fn integers(&self) -> Result<Vec<u32>, ScanError> {
         self.collect(0, |bytes| unsigned(bytes, self.component))
     }
 
-    /// All elements of VEC4 as they are stored; the caller has made sure of the type and that the component is u8 or u16.
+    /// All elements of VEC4 as stored. The caller has checked that the type is VEC4 and the component u8 or u16.
     pub fn quadruples(&self) -> Result<Vec<[u16; 4]>, ScanError> {
         let step = self.component.size();
         self.collect([0; 4], |bytes| {
@@ -127,7 +131,7 @@ impl<'d> Accessor<'d> {
 }
 
 impl<'d> Elements<'d> {
-    /// The elements in order; the extent was checked when they were opened.
+    /// The elements in order; their extent was checked on opening.
     fn iter(&self) -> impl Iterator<Item = &'d [u8]> {
         let size = self.size;
         self.bytes
@@ -136,10 +140,10 @@ impl<'d> Elements<'d> {
     }
 }
 
-/// `count` elements of `size` bytes in `view`, from the `byteOffset` of `place`.
+/// `count` elements of `size` bytes in `view`, starting at the `byteOffset` of `place`.
 fn elements<'d>(
-    view: View<'d>,
-    place: &Place<'_>,
+    view: BufferView<'d>,
+    place: &JsonPlace<'_>,
     count: usize,
     size: usize,
 ) -> Result<Elements<'d>, ScanError> {
@@ -176,15 +180,15 @@ fn elements<'d>(
 
 fn open_sparse<'d, 'a>(
     document: &'d Document<'a>,
-    place: &Place<'a>,
-    elements_there: usize,
+    place: &JsonPlace<'a>,
+    elements_of_base: usize,
     size: usize,
-) -> Result<Sparse<'d>, ScanError> {
+) -> Result<SparseAccessor<'d>, ScanError> {
     let count = place.need("count")?;
     let n = count.integer()?;
-    if n > elements_there {
+    if n > elements_of_base {
         return Err(count.invalid(format!(
-            "is {n}, more than the {elements_there} elements of the accessor"
+            "is {n}, more than the {elements_of_base} elements of the accessor"
         )));
     }
     let indices_place = place.need("indices")?;
@@ -195,7 +199,7 @@ fn open_sparse<'d, 'a>(
     let values_place = place.need("values")?;
     let indices = document.view(&indices_place.need("bufferView")?)?;
     let values = document.view(&values_place.need("bufferView")?)?;
-    Ok(Sparse {
+    Ok(SparseAccessor {
         indices: elements(indices, &indices_place, n, component.size())?,
         component,
         values: elements(values, &values_place, n, size)?,
@@ -203,7 +207,7 @@ fn open_sparse<'d, 'a>(
     })
 }
 
-/// Whether indices may be stored like this.
+/// Whether glTF allows indices of this component type.
 pub(super) fn is_unsigned(component: ComponentType) -> bool {
     matches!(
         component,
@@ -211,7 +215,7 @@ pub(super) fn is_unsigned(component: ComponentType) -> bool {
     )
 }
 
-fn component(place: &Place<'_>) -> Result<ComponentType, ScanError> {
+fn component(place: &JsonPlace<'_>) -> Result<ComponentType, ScanError> {
     match u32::try_from(place.integer()?).unwrap_or(0) {
         BYTE => Ok(ComponentType::I8),
         UNSIGNED_BYTE => Ok(ComponentType::U8),
@@ -223,7 +227,7 @@ fn component(place: &Place<'_>) -> Result<ComponentType, ScanError> {
     }
 }
 
-fn kind(place: &Place<'_>) -> Result<Type, ScanError> {
+fn kind(place: &JsonPlace<'_>) -> Result<Type, ScanError> {
     match place.text()? {
         "SCALAR" => Ok(Type::Scalar),
         "VEC2" => Ok(Type::Vec2),
@@ -238,7 +242,7 @@ fn unsigned(bytes: &[u8], component: ComponentType) -> u32 {
         (ComponentType::U8, &[a, ..]) => a.into(),
         (ComponentType::U16, &[a, b, ..]) => u16::from_le_bytes([a, b]).into(),
         (ComponentType::U32, &[a, b, c, d, ..]) => u32::from_le_bytes([a, b, c, d]),
-        // Callers ask for unsigned components only.
+        // Callers pass unsigned components only.
         _ => 0,
     }
 }
@@ -258,10 +262,10 @@ fn float(bytes: &[u8], component: ComponentType, normalized: bool) -> f32 {
             f64::from(u32::from_le_bytes([a, b, c, d])),
             f64::from(u32::MAX),
         ),
-        // `bytes` is always one component long.
+        // Not reached: `bytes` is always one component long.
         _ => (0.0, 1.0),
     };
-    // The most negative integer stands one step below −1 and is clamped (glTF 2.0, 3.6.2.2).
+    // The most negative integer is one step below −1 and is clamped (glTF 2.0, 3.6.2.2).
     if normalized {
         (value / full).max(-1.0) as f32
     } else {

@@ -1,4 +1,4 @@
-//! Appending to a scan's JSON and buffers, so that nothing before it moves.
+//! Appends to a scan's JSON and buffers; all that was there keeps its place.
 
 use std::collections::BTreeMap;
 
@@ -7,44 +7,65 @@ use base64::engine::general_purpose::STANDARD;
 use gltf::json::accessor::{ComponentType, Type};
 use serde_json::{Value, json};
 
+use super::buffers::BufferTarget;
 use super::container::{Container, pack_glb};
-use super::splice::Splice;
-use super::{Scan, ScanError};
+use super::error::ScanError;
+use super::json_edit::JsonEdit;
+use super::scan::Scan;
 
-/// `ARRAY_BUFFER` and `ELEMENT_ARRAY_BUFFER` (glTF 2.0, 5.11.5).
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Target {
-    Vertices = 34962,
-    Indices = 34963,
-}
-
-/// What is to be appended to a scan: elements of lists in its JSON, and the bytes that go with them.
+/// What to append to a scan: elements of lists in its JSON, and bytes.
 pub(super) struct Appender<'s> {
     scan: &'s Scan,
     /// New elements of the lists at the top of the JSON.
     lists: BTreeMap<&'static str, Vec<Value>>,
     /// New primitives by mesh.
     primitives: BTreeMap<usize, Vec<Value>>,
-    /// The buffer that takes the new bytes, and how many bytes stand in it before them.
+    /// The buffer that takes the new bytes.
     buffer: usize,
+    /// How many bytes that buffer has before them.
     start: usize,
-    /// Whether that buffer is the BIN chunk; otherwise it is a data URI of its own.
+    /// Whether that buffer is the BIN chunk; if not, it is a new data URI.
     in_bin: bool,
     data: Vec<u8>,
 }
 
-/// What an accessor holds.
-pub(super) struct Content<'c> {
+/// The values of a new accessor.
+pub(super) struct AccessorData<'c> {
     pub name: &'c str,
-    pub target: Target,
+    pub target: BufferTarget,
     pub component: ComponentType,
     pub kind: Type,
     pub bytes: Vec<u8>,
-    /// Smallest and largest value by component, where glTF wants them.
-    pub bounds: Option<[[f32; 3]; 2]>,
+    /// The bounds of the values, where glTF requires them.
+    pub bounds: Option<Bounds>,
+}
+
+/// The smallest and the largest value of each component.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bounds {
+    pub min: [f32; 3],
+    pub max: [f32; 3],
+}
+
+impl Bounds {
+    /// The bounds of a list of points.
+    pub fn of(points: &[[f32; 3]]) -> Self {
+        let mut bounds = Self {
+            min: [f32::INFINITY; 3],
+            max: [f32::NEG_INFINITY; 3],
+        };
+        for point in points {
+            for (k, x) in point.iter().enumerate() {
+                bounds.min[k] = bounds.min[k].min(*x);
+                bounds.max[k] = bounds.max[k].max(*x);
+            }
+        }
+        bounds
+    }
 }
 
 impl<'s> Appender<'s> {
+    /// Nothing appended yet.
     pub fn new(scan: &'s Scan) -> Self {
         let buffers = scan
             .json
@@ -53,7 +74,7 @@ impl<'s> Appender<'s> {
             .map_or(&[][..], Vec::as_slice);
         let in_bin = scan.layout.container == Container::Glb
             && match buffers.first() {
-                // The BIN chunk belongs to the first buffer, if that has no uri.
+                // The BIN chunk is the first buffer's if that has no uri.
                 Some(first) => first.get("uri").is_none() && scan.layout.bin.is_some(),
                 None => true,
             };
@@ -73,9 +94,9 @@ impl<'s> Appender<'s> {
         }
     }
 
-    /// Appends to the list `key` at the top of the JSON; the new element's index.
+    /// Appends to the list `key` at the top of the JSON; returns the new element's index.
     pub fn push(&mut self, key: &'static str, value: Value) -> usize {
-        let there = self
+        let old = self
             .scan
             .json
             .get(key)
@@ -83,7 +104,7 @@ impl<'s> Appender<'s> {
             .map_or(0, Vec::len);
         let list = self.lists.entry(key).or_default();
         list.push(value);
-        there + list.len() - 1
+        old + list.len() - 1
     }
 
     /// Appends a primitive to a mesh.
@@ -91,37 +112,37 @@ impl<'s> Appender<'s> {
         self.primitives.entry(mesh).or_default().push(primitive);
     }
 
-    /// Appends an accessor over a buffer view of its own; its index.
-    pub fn accessor(&mut self, content: Content<'_>) -> Value {
-        let size = content.component.size() * content.kind.multiplicity();
-        let count = content.bytes.len() / size;
+    /// Appends an accessor with a buffer view of its own; returns the accessor's index.
+    pub fn accessor(&mut self, data: AccessorData<'_>) -> Value {
+        let size = data.component.size() * data.kind.multiplicity();
+        let count = data.bytes.len() / size;
         let view = json!({
-            "name": content.name,
+            "name": data.name,
             "buffer": self.buffer,
             "byteOffset": self.start + self.data.len(),
-            "byteLength": content.bytes.len(),
-            "target": content.target as u32,
+            "byteLength": data.bytes.len(),
+            "target": data.target as u32,
         });
-        self.data.extend_from_slice(&content.bytes);
-        // The next view starts on a multiple of four.
+        self.data.extend_from_slice(&data.bytes);
+        // The next buffer view starts at a multiple of four.
         self.data.resize(self.data.len().next_multiple_of(4), 0);
         let view = self.push("bufferViews", view);
         let mut accessor = json!({
-            "name": content.name,
+            "name": data.name,
             "bufferView": view,
-            "componentType": content.component.as_gl_enum(),
+            "componentType": data.component.as_gl_enum(),
             "count": count,
-            "type": name(content.kind),
+            "type": type_name(data.kind),
         });
-        if let (Some([min, max]), Some(object)) = (content.bounds, accessor.as_object_mut()) {
-            // In f64, whose digits give the f32 back exactly to readers of either width.
-            object.insert("min".into(), json!(min.map(f64::from)));
-            object.insert("max".into(), json!(max.map(f64::from)));
+        if let (Some(bounds), Some(object)) = (data.bounds, accessor.as_object_mut()) {
+            // Written as f64: readers of f32 and of f64 then both get the exact f32.
+            object.insert("min".into(), json!(bounds.min.map(f64::from)));
+            object.insert("max".into(), json!(bounds.max.map(f64::from)));
         }
         json!(self.push("accessors", accessor))
     }
 
-    /// The whole scan in its own container.
+    /// The whole scan, in the container it was read from.
     pub fn finish(mut self) -> Result<Vec<u8>, ScanError> {
         let too_long = |length: usize| ScanError::Container {
             offset: length,
@@ -129,7 +150,7 @@ impl<'s> Appender<'s> {
         };
         let length = self.start + self.data.len();
         let (bytes, layout) = (&self.scan.bytes, &self.scan.layout);
-        let mut splice = Splice::new(bytes.get(layout.json.clone()).unwrap_or_default())?;
+        let mut edit = JsonEdit::new(bytes.get(layout.json.clone()).unwrap_or_default())?;
         if !self.in_bin {
             let uri = format!(
                 "data:application/octet-stream;base64,{}",
@@ -137,17 +158,17 @@ impl<'s> Appender<'s> {
             );
             self.push("buffers", json!({ "byteLength": length, "uri": uri }));
         } else if self.push("buffers", json!({ "byteLength": length })) > 0 {
-            // The BIN chunk has its buffer already: that one grows.
+            // The BIN chunk already has a buffer: its length grows.
             self.lists.remove("buffers");
-            splice.replace(&["buffers", "0", "byteLength"], &json!(length))?;
+            edit.replace(&["buffers", "0", "byteLength"], &json!(length))?;
         }
         for (mesh, primitives) in &self.primitives {
-            splice.append(&["meshes", &mesh.to_string(), "primitives"], primitives)?;
+            edit.append(&["meshes", &mesh.to_string(), "primitives"], primitives)?;
         }
         for (key, values) in &self.lists {
-            splice.append(&[key], values)?;
+            edit.append(&[key], values)?;
         }
-        let text = splice.finish().into_bytes();
+        let text = edit.finish().into_bytes();
         if layout.container == Container::Gltf {
             return Ok(text);
         }
@@ -166,7 +187,7 @@ impl<'s> Appender<'s> {
     }
 }
 
-fn name(kind: Type) -> &'static str {
+fn type_name(kind: Type) -> &'static str {
     match kind {
         Type::Scalar => "SCALAR",
         Type::Vec2 => "VEC2",

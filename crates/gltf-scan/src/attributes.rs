@@ -1,4 +1,4 @@
-//! What a primitive's vertices carry beside their positions: normals, texture coordinates, colours, joints and weights.
+//! Vertex attributes other than positions: normals, texture coordinates, colours, joints and weights.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -7,28 +7,28 @@ use gltf::json::accessor::{ComponentType, Type};
 
 use super::accessor::Accessor;
 use super::buffers::Document;
-use super::json::Place;
-use super::read::within;
+use super::error::ScanError;
+use super::json::JsonPlace;
+use super::limits::{Limit, ScanLimits};
 use super::skin::{Influence, Influences};
-use super::{ScanError, ScanLimits};
 
-type Uvs = Arc<[[f32; 2]]>;
-type Rgba = Arc<[[f32; 4]]>;
+type TexcoordSet = Arc<[[f32; 2]]>;
+type ColorSet = Arc<[[f32; 4]]>;
 
-/// Decodes vertex attributes, each accessor once: primitives and instances share them.
-pub(super) struct Attributes<'d, 'a> {
+/// Decodes vertex attributes, each accessor once: primitives and instances share the result.
+pub(super) struct AttributeReader<'d, 'a> {
     document: &'d Document<'a>,
     limits: &'d ScanLimits,
-    /// By accessor.
-    texcoords: HashMap<usize, Uvs>,
-    colors: HashMap<usize, (Type, Rgba)>,
-    /// By the accessors of joints and of weights.
+    /// Decoded sets by accessor.
+    texcoords: HashMap<usize, TexcoordSet>,
+    colors: HashMap<usize, (Type, ColorSet)>,
+    /// Decoded sets by the accessors of joints and of weights.
     influences: HashMap<(usize, usize), Influences>,
     /// Numbers decoded so far.
     values: usize,
 }
 
-impl<'d, 'a> Attributes<'d, 'a> {
+impl<'d, 'a> AttributeReader<'d, 'a> {
     pub fn new(document: &'d Document<'a>, limits: &'d ScanLimits) -> Self {
         Self {
             document,
@@ -43,7 +43,7 @@ impl<'d, 'a> Attributes<'d, 'a> {
     /// The normals, if there are any; NaN and infinities read as 0.
     pub fn normals(
         &mut self,
-        attributes: &Place<'a>,
+        attributes: &JsonPlace<'a>,
         vertices: usize,
     ) -> Result<Option<Arc<[[f32; 3]]>>, ScanError> {
         let Some(reference) = attributes.get("NORMAL")? else {
@@ -52,17 +52,18 @@ impl<'d, 'a> Attributes<'d, 'a> {
         let (_, place) = self.document.root.referred("accessors", &reference)?;
         let accessor = self.attribute(&place, &[Type::Vec3])?;
         let normals: Arc<[_]> = (accessor.floats([0.0; 3])?.into_iter())
-            .map(|normal| normal.map(tame))
+            .map(|normal| normal.map(finite_or_zero))
             .collect();
         same_count(&place, normals.len(), vertices)?;
         Ok(Some(normals))
     }
 
+    /// The texture coordinate sets; NaN and infinities read as 0.
     pub fn texcoords(
         &mut self,
-        attributes: &Place<'a>,
+        attributes: &JsonPlace<'a>,
         vertices: usize,
-    ) -> Result<Vec<Uvs>, ScanError> {
+    ) -> Result<Vec<TexcoordSet>, ScanError> {
         self.sets(attributes, |all, n| {
             let Some(reference) = attributes.get(&format!("TEXCOORD_{n}"))? else {
                 return Ok(None);
@@ -75,7 +76,7 @@ impl<'d, 'a> Attributes<'d, 'a> {
                     let set: Arc<[_]> = accessor
                         .floats([0.0; 2])?
                         .into_iter()
-                        .map(|uv| uv.map(tame))
+                        .map(|uv| uv.map(finite_or_zero))
                         .collect();
                     all.texcoords.insert(key, Arc::clone(&set));
                     set
@@ -86,12 +87,12 @@ impl<'d, 'a> Attributes<'d, 'a> {
         })
     }
 
-    /// The colour sets and, beside them, their types in the file.
+    /// The types of the colour sets in the file, and the sets; NaN and infinities read as 0.
     pub fn colors(
         &mut self,
-        attributes: &Place<'a>,
+        attributes: &JsonPlace<'a>,
         vertices: usize,
-    ) -> Result<(Vec<Type>, Vec<Rgba>), ScanError> {
+    ) -> Result<(Vec<Type>, Vec<ColorSet>), ScanError> {
         let sets = self.sets(attributes, |all, n| {
             let Some(reference) = attributes.get(&format!("COLOR_{n}"))? else {
                 return Ok(None);
@@ -104,7 +105,7 @@ impl<'d, 'a> Attributes<'d, 'a> {
                     let set = accessor
                         .floats([0.0, 0.0, 0.0, 1.0])?
                         .into_iter()
-                        .map(|rgba| rgba.map(tame));
+                        .map(|rgba| rgba.map(finite_or_zero));
                     let set: Arc<[_]> = set.collect();
                     all.colors.insert(key, (accessor.kind, Arc::clone(&set)));
                     (accessor.kind, set)
@@ -116,10 +117,10 @@ impl<'d, 'a> Attributes<'d, 'a> {
         Ok(sets.into_iter().unzip())
     }
 
-    /// The sets of joints and weights, as far as both are there.
+    /// The sets of joints and weights, up to the first set that lacks one of the two.
     pub fn influences(
         &mut self,
-        attributes: &Place<'a>,
+        attributes: &JsonPlace<'a>,
         vertices: usize,
     ) -> Result<Vec<Influences>, ScanError> {
         self.sets(attributes, |all, n| {
@@ -145,30 +146,29 @@ impl<'d, 'a> Attributes<'d, 'a> {
         })
     }
 
-    /// Sets 0, 1, … of a primitive, up to the first that `next` does not find.
+    /// Sets 0, 1, … of a primitive, up to the first that `read` does not find.
     fn sets<S>(
         &mut self,
-        attributes: &Place<'a>,
-        mut next: impl FnMut(&mut Self, usize) -> Result<Option<S>, ScanError>,
+        attributes: &JsonPlace<'a>,
+        mut read: impl FnMut(&mut Self, usize) -> Result<Option<S>, ScanError>,
     ) -> Result<Vec<S>, ScanError> {
         let mut sets = Vec::new();
-        while let Some(set) = next(self, sets.len())? {
+        while let Some(set) = read(self, sets.len())? {
             sets.push(set);
-            within(
-                self.limits.max_attribute_sets,
-                "max_attribute_sets",
-                sets.len(),
-                &attributes.pointer,
-            )?;
+            let limit = Limit {
+                name: "max_attribute_sets",
+                allowed: self.limits.max_attribute_sets,
+            };
+            limit.check(sets.len(), &attributes.pointer)?;
         }
         Ok(sets)
     }
 
-    /// Decodes a JOINTS accessor and the WEIGHTS that go with it; negative weights read as 0.
+    /// Decodes a JOINTS accessor and its WEIGHTS; negative weights read as 0.
     fn weighted_joints(
         &mut self,
-        joints: &Place<'a>,
-        weights: &Place<'a>,
+        joints: &JsonPlace<'a>,
+        weights: &JsonPlace<'a>,
         vertices: usize,
     ) -> Result<Influences, ScanError> {
         let accessor = self.attribute(joints, &[Type::Vec4])?;
@@ -180,7 +180,7 @@ impl<'d, 'a> Attributes<'d, 'a> {
         let accessor = self.attribute(weights, &[Type::Vec4])?;
         same_count(weights, accessor.count, vertices)?;
         let of_weights = accessor.floats([0.0; 4])?.into_iter();
-        let of_weights = of_weights.map(|weights| weights.map(|w| tame(w).max(0.0)));
+        let of_weights = of_weights.map(|weights| weights.map(|w| finite_or_zero(w).max(0.0)));
         let influences = of_joints.into_iter().zip(of_weights);
         Ok(influences
             .map(|(joints, weights)| Influence { joints, weights })
@@ -188,29 +188,33 @@ impl<'d, 'a> Attributes<'d, 'a> {
     }
 
     /// Opens a vertex attribute and counts its values against the limit.
-    fn attribute(&mut self, place: &Place<'a>, kinds: &[Type]) -> Result<Accessor<'d>, ScanError> {
+    fn attribute(
+        &mut self,
+        place: &JsonPlace<'a>,
+        kinds: &[Type],
+    ) -> Result<Accessor<'d>, ScanError> {
         let accessor = Accessor::open(self.document, place)?;
         if !kinds.contains(&accessor.kind) {
             return Err(place.invalid(format!("must be one of {kinds:?} here")));
         }
         let values = accessor.count.saturating_mul(accessor.kind.multiplicity());
         self.values = self.values.saturating_add(values);
-        within(
-            self.limits.max_attribute_values,
-            "max_attribute_values",
-            self.values,
-            &place.pointer,
-        )?;
+        let limit = Limit {
+            name: "max_attribute_values",
+            allowed: self.limits.max_attribute_values,
+        };
+        limit.check(self.values, &place.pointer)?;
         Ok(accessor)
     }
 }
 
-/// A file may carry NaN in attributes that nothing depends on; a patch must not spread it.
-fn tame(x: f32) -> f32 {
+/// A number, or 0 for NaN and infinities: a file may have those where its viewers ignore them, and a patch must not
+/// copy them.
+fn finite_or_zero(x: f32) -> f32 {
     if x.is_finite() { x } else { 0.0 }
 }
 
-fn same_count(place: &Place<'_>, count: usize, vertices: usize) -> Result<(), ScanError> {
+fn same_count(place: &JsonPlace<'_>, count: usize, vertices: usize) -> Result<(), ScanError> {
     if count == vertices {
         return Ok(());
     }

@@ -1,4 +1,5 @@
-//! From buffer views to bytes: the BIN chunk and data URIs, each bounds-checked, decoded at most once, and never a file or URL.
+//! The bytes of buffer views: from the BIN chunk and data URIs, never from a file or URL. Each is bounds-checked, and
+//! decoded at most once.
 
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
@@ -7,35 +8,42 @@ use base64::Engine as _;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 
-use super::ScanError;
-use super::json::Place;
+use super::error::ScanError;
+use super::json::JsonPlace;
 
-/// Padding is not insisted on: some exporters leave it out.
+/// Padding is optional: some exporters leave it out.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &STANDARD,
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
 );
 
-/// Compressions that replace the bytes of a buffer view.
+/// Extensions that compress the bytes of a buffer view.
 const COMPRESSED_VIEWS: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 
-/// The scan's JSON root with its buffers behind it.
+/// `ARRAY_BUFFER` and `ELEMENT_ARRAY_BUFFER` (glTF 2.0, 5.11.5).
+#[derive(Debug, Clone, Copy)]
+pub(super) enum BufferTarget {
+    Vertices = 34962,
+    Indices = 34963,
+}
+
+/// The scan's JSON and its buffers.
 pub(super) struct Document<'a> {
-    pub root: Place<'a>,
+    pub root: JsonPlace<'a>,
     bin: Option<&'a [u8]>,
     decoded: Vec<OnceCell<Vec<u8>>>,
     required: BTreeSet<&'a str>,
 }
 
-/// The bytes of a buffer view and how far apart its elements lie, if it says so.
-pub(super) struct View<'d> {
+/// The bytes of a buffer view and the distance of its elements in bytes, if it is given.
+pub(super) struct BufferView<'d> {
     pub bytes: &'d [u8],
     pub stride: Option<usize>,
     pub pointer: String,
 }
 
 impl<'a> Document<'a> {
-    pub fn new(root: Place<'a>, bin: Option<&'a [u8]>) -> Result<Self, ScanError> {
+    pub fn new(root: JsonPlace<'a>, bin: Option<&'a [u8]>) -> Result<Self, ScanError> {
         let buffers = root
             .get("buffers")?
             .map_or(Ok(0), |buffers| buffers.array().map(<[_]>::len))?;
@@ -59,11 +67,11 @@ impl<'a> Document<'a> {
     }
 
     /// The buffer view that `from` refers to.
-    pub fn view(&self, from: &Place<'a>) -> Result<View<'_>, ScanError> {
+    pub fn view(&self, from: &JsonPlace<'a>) -> Result<BufferView<'_>, ScanError> {
         let (_, view) = self.root.referred("bufferViews", from)?;
         let (index, buffer) = self.root.referred("buffers", &view.need("buffer")?)?;
         for name in COMPRESSED_VIEWS {
-            // Unless it is required, the plain bytes may be there as a fallback.
+            // If the file does not require the extension, the plain bytes may be there as a fallback.
             let Some(extension) = view.extension(name)? else {
                 continue;
             };
@@ -88,19 +96,19 @@ impl<'a> Document<'a> {
             .get("byteStride")?
             .map(|stride| stride.integer())
             .transpose()?;
-        Ok(View {
+        Ok(BufferView {
             bytes,
             stride,
             pointer: view.pointer,
         })
     }
 
-    /// Whether the scan says that it cannot be read without this extension.
+    /// Whether the file requires this extension.
     pub fn requires(&self, name: &str) -> bool {
         self.required.contains(name)
     }
 
-    fn buffer(&self, index: usize, place: &Place<'a>) -> Result<&[u8], ScanError> {
+    fn buffer(&self, index: usize, place: &JsonPlace<'a>) -> Result<&[u8], ScanError> {
         let length = place.need("byteLength")?;
         let bytes = match (place.get("uri")?, self.bin, self.decoded.get(index)) {
             (Some(uri), _, Some(cell)) => match cell.get() {
@@ -127,8 +135,8 @@ impl<'a> Document<'a> {
     }
 }
 
-/// The bytes of a base64 data URI; anything else is refused unopened.
-fn decode(uri: &Place<'_>) -> Result<Vec<u8>, ScanError> {
+/// The bytes of a base64 data URI; any other URI is refused and not opened.
+fn decode(uri: &JsonPlace<'_>) -> Result<Vec<u8>, ScanError> {
     const SHOWN: usize = 80;
     let text = uri.text()?;
     let Some(data) = text.strip_prefix("data:") else {

@@ -1,20 +1,20 @@
-//! The outer shell of a scan: GLB chunks, or a bare JSON document.
+//! The container of a scan: GLB chunks, or a JSON document.
 
 use std::ops::Range;
 
-use super::ScanError;
+use super::error::ScanError;
 
-/// How the scan is packed; told by its first bytes, not by a name or media type.
+/// The container of a scan. Its first bytes decide, not a file name or media type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Container {
-    /// Binary glTF: magic `glTF`, a JSON chunk, mostly a BIN chunk.
+    /// Binary glTF: the magic `glTF`, a JSON chunk and usually a BIN chunk.
     Glb,
     /// A JSON document with its buffers as data URIs.
     Gltf,
 }
 
 impl Container {
-    /// The media type of this packing.
+    /// The media type of this container.
     pub fn media_type(self) -> &'static str {
         match self {
             Self::Glb => "model/gltf-binary",
@@ -23,9 +23,9 @@ impl Container {
     }
 }
 
-/// Where the parts of a scan lie in its bytes.
+/// The container of a scan and the byte ranges of its contents.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Layout {
+pub(super) struct ContainerLayout {
     pub container: Container,
     pub json: Range<usize>,
     /// The payload of the BIN chunk, padding included.
@@ -40,8 +40,8 @@ const BIN_CHUNK: u32 = 0x004E_4942;
 const HEADER: usize = 12;
 const CHUNK_HEADER: usize = 8;
 
-/// Finds the parts of a scan; allocates nothing.
-pub(super) fn layout(bytes: &[u8]) -> Result<Layout, ScanError> {
+/// Finds the container and its contents; allocates nothing.
+pub(super) fn layout(bytes: &[u8]) -> Result<ContainerLayout, ScanError> {
     let fail = |offset: usize, detail: &str| ScanError::Container {
         offset,
         detail: detail.into(),
@@ -58,7 +58,7 @@ pub(super) fn layout(bytes: &[u8]) -> Result<Layout, ScanError> {
         0
     };
     match bytes.iter().skip(start).find(|b| !b.is_ascii_whitespace()) {
-        Some(b'{') => Ok(Layout {
+        Some(b'{') => Ok(ContainerLayout {
             container: Container::Gltf,
             json: start..bytes.len(),
             bin: None,
@@ -71,7 +71,7 @@ pub(super) fn layout(bytes: &[u8]) -> Result<Layout, ScanError> {
     }
 }
 
-fn glb_layout(bytes: &[u8]) -> Result<Layout, ScanError> {
+fn glb_layout(bytes: &[u8]) -> Result<ContainerLayout, ScanError> {
     let fail = |offset: usize, detail: String| ScanError::Container { offset, detail };
     let (Some(version), Some(length)) = (word(bytes, 4), word(bytes, 8)) else {
         return Err(fail(bytes.len(), "the GLB header is cut off".into()));
@@ -109,7 +109,7 @@ fn glb_layout(bytes: &[u8]) -> Result<Layout, ScanError> {
         .take_while(|byte| **byte == 0)
         .count();
     let json = json.start..json.end - padding;
-    Ok(Layout {
+    Ok(ContainerLayout {
         container: Container::Glb,
         json,
         bin,
@@ -117,7 +117,7 @@ fn glb_layout(bytes: &[u8]) -> Result<Layout, ScanError> {
     })
 }
 
-/// Kind and payload of the chunk whose header stands at `at`.
+/// Kind and payload of the chunk whose header is at byte `at`.
 fn chunk(bytes: &[u8], at: usize) -> Result<(u32, Range<usize>), ScanError> {
     let (Some(length), Some(kind)) = (word(bytes, at), word(bytes, at + 4)) else {
         return Err(ScanError::Container {
@@ -141,7 +141,7 @@ fn word(bytes: &[u8], at: usize) -> Option<u32> {
         .map(|word| u32::from_le_bytes(*word))
 }
 
-/// Packs a GLB: JSON padded with spaces, BIN with zeros, the other chunks as they were.
+/// Packs a GLB: JSON padded with spaces, BIN padded with zeros, then `rest`, whole chunks.
 ///
 /// Returns `None` if the whole would not fit the format's 32-bit lengths.
 pub(super) fn pack_glb(json: &[u8], bin: Option<&[u8]>, rest: &[u8]) -> Option<Vec<u8>> {
@@ -158,7 +158,7 @@ pub(super) fn pack_glb(json: &[u8], bin: Option<&[u8]>, rest: &[u8]) -> Option<V
     out.extend_from_slice(&total.to_le_bytes());
     let mut push = |kind: u32, body: &[u8], fill: u8| {
         let length = padded(body.len());
-        // Fits: it is part of `total`.
+        // The cast is lossless: the length is part of `total`, which is a u32.
         out.extend_from_slice(&(length as u32).to_le_bytes());
         out.extend_from_slice(&kind.to_le_bytes());
         out.extend_from_slice(body);
@@ -170,6 +170,14 @@ pub(super) fn pack_glb(json: &[u8], bin: Option<&[u8]>, rest: &[u8]) -> Option<V
     }
     out.extend_from_slice(rest);
     Some(out)
+}
+
+/// Rows of floats as a buffer stores them, little-endian.
+pub(super) fn float_bytes<const N: usize>(rows: &[[f32; N]]) -> Vec<u8> {
+    rows.iter()
+        .flatten()
+        .flat_map(|x| x.to_le_bytes())
+        .collect()
 }
 
 #[cfg(test)]

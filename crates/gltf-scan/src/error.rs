@@ -1,6 +1,6 @@
-//! Why a scan could not be read or a patch not be written.
+//! Why a scan could not be read, or a patch could not be written.
 //!
-//! Every variant about the file carries an RFC 6901 pointer into its JSON, so that a person can go and look.
+//! Every variant about the file carries an RFC 6901 pointer into its JSON, so that a person can find the place.
 
 /// Why a scan could not be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -32,7 +32,7 @@ pub enum ScanError {
         element: usize,
         /// The index found.
         index: u32,
-        /// How many vertices there are.
+        /// How many vertices the primitive has.
         vertices: usize,
     },
     /// A position is NaN or infinite, as stored or once its node's transform is applied.
@@ -53,7 +53,7 @@ pub enum ScanError {
         /// The extension's name.
         extension: &'static str,
     },
-    /// Needed data lies outside the file. It is never opened.
+    /// Data that the scan needs is in another file, which is never opened.
     #[error(
         "{pointer}: the data is in another file ({uri:?}); send a GLB or embed it as a data URI"
     )]
@@ -63,22 +63,22 @@ pub enum ScanError {
         /// The URI's first characters.
         uri: String,
     },
-    /// The scan is larger than a limit allows.
+    /// The scan exceeds a limit.
     #[error("{pointer}: {found} exceeds the limit {limit} = {allowed}")]
     Limit {
-        /// JSON pointer to the place that goes over.
+        /// JSON pointer to the place that exceeds it.
         pointer: String,
         /// The limit's name, a field of [`super::ScanLimits`].
         limit: &'static str,
         /// The limit's value.
         allowed: usize,
-        /// What was found (the count up to and with this place).
+        /// What was found: the count up to this place, inclusive.
         found: usize,
     },
     /// The default scene draws no triangle.
     #[error("the default scene draws no triangles; there is nothing to mend")]
     NoTriangles,
-    /// A patch cannot be brought into the space of a node whose transform flattens everything.
+    /// A patch cannot be transformed to the space of a node whose transform is singular.
     #[error(
         "/nodes/{node}: the node's transform is singular; a patch cannot be written into its space"
     )]
@@ -86,11 +86,11 @@ pub enum ScanError {
         /// The node.
         node: usize,
     },
-    /// A patch that was to be appended contradicts itself or the scan.
-    #[error("addition {addition}: {detail}")]
-    Addition {
-        /// Which of the additions.
-        addition: usize,
+    /// A patch to append contradicts itself or the scan, or the meshes to write exceed the size of a GLB.
+    #[error("addition {patch}: {detail}")]
+    InvalidPatch {
+        /// Which of the patches.
+        patch: usize,
         /// What is wrong with it.
         detail: String,
     },
@@ -98,7 +98,8 @@ pub enum ScanError {
 
 impl ScanError {
     /// The JSON pointer of the place in the scan, where there is one.
-    pub fn pointer(&self) -> Option<&str> {
+    #[cfg(test)]
+    pub(crate) fn pointer(&self) -> Option<&str> {
         match self {
             Self::Invalid { pointer, .. }
             | Self::IndexOutOfRange { pointer, .. }
@@ -109,7 +110,7 @@ impl ScanError {
             Self::Container { .. }
             | Self::NoTriangles
             | Self::Singular { .. }
-            | Self::Addition { .. } => None,
+            | Self::InvalidPatch { .. } => None,
         }
     }
 }

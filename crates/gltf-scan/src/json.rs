@@ -1,17 +1,18 @@
-//! A JSON value together with where it stands, so that every complaint can name the place.
+//! A JSON value together with its JSON pointer, so that every error can name the place.
 
 use serde_json::{Number, Value};
 
-use super::ScanError;
+use super::error::ScanError;
 
 /// A value inside the scan's JSON and the RFC 6901 pointer to it.
 #[derive(Debug, Clone)]
-pub(super) struct Place<'a> {
+pub(super) struct JsonPlace<'a> {
     pub value: &'a Value,
     pub pointer: String,
 }
 
-impl<'a> Place<'a> {
+impl<'a> JsonPlace<'a> {
+    /// The whole document.
     pub fn root(value: &'a Value) -> Self {
         Self {
             value,
@@ -19,7 +20,7 @@ impl<'a> Place<'a> {
         }
     }
 
-    /// A complaint about this place.
+    /// An error about this place.
     pub fn invalid(&self, detail: impl Into<String>) -> ScanError {
         ScanError::Invalid {
             pointer: self.pointer.clone(),
@@ -28,19 +29,19 @@ impl<'a> Place<'a> {
     }
 
     /// The member `key` of this object, if there is one.
-    pub fn get(&self, key: &str) -> Result<Option<Place<'a>>, ScanError> {
+    pub fn get(&self, key: &str) -> Result<Option<JsonPlace<'a>>, ScanError> {
         let object = self
             .value
             .as_object()
             .ok_or_else(|| self.invalid("must be an object"))?;
-        Ok(object.get(key).map(|value| Place {
+        Ok(object.get(key).map(|value| JsonPlace {
             value,
             pointer: format!("{}/{key}", self.pointer),
         }))
     }
 
     /// The member `key` of this object, which must be there.
-    pub fn need(&self, key: &str) -> Result<Place<'a>, ScanError> {
+    pub fn need(&self, key: &str) -> Result<JsonPlace<'a>, ScanError> {
         self.get(key)?.ok_or_else(|| ScanError::Invalid {
             pointer: format!("{}/{key}", self.pointer),
             detail: "is missing".into(),
@@ -48,26 +49,30 @@ impl<'a> Place<'a> {
     }
 
     /// The elements of this array.
-    pub fn items(&self) -> Result<impl Iterator<Item = Place<'a>>, ScanError> {
+    pub fn items(&self) -> Result<impl Iterator<Item = JsonPlace<'a>>, ScanError> {
         let array = self.array()?;
         let pointer = self.pointer.clone();
-        Ok(array.iter().enumerate().map(move |(i, value)| Place {
+        Ok(array.iter().enumerate().map(move |(i, value)| JsonPlace {
             value,
             pointer: format!("{pointer}/{i}"),
         }))
     }
 
-    /// The element `index` of this array, if it has so many.
-    pub fn item(&self, index: usize) -> Result<Option<Place<'a>>, ScanError> {
+    /// The element `index` of this array, if it is that long.
+    pub fn item(&self, index: usize) -> Result<Option<JsonPlace<'a>>, ScanError> {
         let value = self.array()?.get(index);
-        Ok(value.map(|value| Place {
+        Ok(value.map(|value| JsonPlace {
             value,
             pointer: format!("{}/{index}", self.pointer),
         }))
     }
 
     /// The element that `from` (an integer) refers to in the array `key` of this object.
-    pub fn referred(&self, key: &str, from: &Place<'_>) -> Result<(usize, Place<'a>), ScanError> {
+    pub fn referred(
+        &self,
+        key: &str,
+        from: &JsonPlace<'_>,
+    ) -> Result<(usize, JsonPlace<'a>), ScanError> {
         let index = from.integer()?;
         let array: &'a [Value] = match self.get(key)? {
             Some(place) => place.array()?,
@@ -76,7 +81,7 @@ impl<'a> Place<'a> {
         match array.get(index) {
             Some(value) => Ok((
                 index,
-                Place {
+                JsonPlace {
                     value,
                     pointer: format!("{}/{key}/{index}", self.pointer),
                 },
@@ -88,6 +93,7 @@ impl<'a> Place<'a> {
         }
     }
 
+    /// The elements of this array, without their places.
     pub fn array(&self) -> Result<&'a [Value], ScanError> {
         self.value
             .as_array()
@@ -95,12 +101,14 @@ impl<'a> Place<'a> {
             .ok_or_else(|| self.invalid("must be an array"))
     }
 
+    /// This string.
     pub fn text(&self) -> Result<&'a str, ScanError> {
         self.value
             .as_str()
             .ok_or_else(|| self.invalid("must be a string"))
     }
 
+    /// This number, which must be finite.
     pub fn number(&self) -> Result<f64, ScanError> {
         self.value
             .as_f64()
@@ -108,7 +116,7 @@ impl<'a> Place<'a> {
             .ok_or_else(|| self.invalid("must be a finite number"))
     }
 
-    /// A count, offset or index; `1.0` is as good as `1`.
+    /// A count, offset or index; `1.0` is read as `1`.
     pub fn integer(&self) -> Result<usize, ScanError> {
         self.value
             .as_number()
@@ -117,12 +125,12 @@ impl<'a> Place<'a> {
             .ok_or_else(|| self.invalid("must be a non-negative integer"))
     }
 
-    /// The integer member `key`, or `default` when it is left out.
+    /// The integer member `key`, or `default` if it is missing.
     pub fn integer_or(&self, key: &str, default: usize) -> Result<usize, ScanError> {
         self.get(key)?.map_or(Ok(default), |place| place.integer())
     }
 
-    /// The boolean member `key`, false when it is left out.
+    /// The boolean member `key`, or false if it is missing.
     pub fn flag(&self, key: &str) -> Result<bool, ScanError> {
         match self.get(key)? {
             Some(place) => place
@@ -146,7 +154,7 @@ impl<'a> Place<'a> {
     }
 
     /// The object `extensions/<name>` of this object, if there is one.
-    pub fn extension(&self, name: &str) -> Result<Option<Place<'a>>, ScanError> {
+    pub fn extension(&self, name: &str) -> Result<Option<JsonPlace<'a>>, ScanError> {
         match self.get("extensions")? {
             Some(extensions) => extensions.get(name),
             None => Ok(None),
@@ -154,7 +162,7 @@ impl<'a> Place<'a> {
     }
 }
 
-/// The number as an integer however it is spelled, up to 2⁵³.
+/// The number as an integer, in any spelling, up to 2⁵³.
 pub(super) fn integral(number: &Number) -> Option<u64> {
     const EXACT: f64 = 9_007_199_254_740_992.0;
     number.as_u64().or_else(|| {
@@ -163,7 +171,8 @@ pub(super) fn integral(number: &Number) -> Option<u64> {
     })
 }
 
-/// An upper bound of the values in a JSON text, found without building them: its brackets, commas and colons outside strings.
+/// An upper bound of the number of values in a JSON text, without parsing it: its opening brackets, commas and colons
+/// outside strings.
 pub(super) fn values_at_most(text: &[u8]) -> usize {
     let (mut count, mut inside, mut escaped) = (1, false, false);
     for &byte in text {
@@ -201,14 +210,14 @@ mod tests {
             ("1e99", None),
         ] {
             let value: Value = serde_json::from_str(text).unwrap();
-            assert_eq!(Place::root(&value).integer().ok(), want, "{text}");
+            assert_eq!(JsonPlace::root(&value).integer().ok(), want, "{text}");
         }
     }
 
     #[test]
     fn errors_name_the_place() {
         let value = json!({"accessors": [{"count": "many"}], "at": 4});
-        let root = Place::root(&value);
+        let root = JsonPlace::root(&value);
         let accessor = root
             .get("accessors")
             .unwrap()

@@ -1,57 +1,73 @@
-//! From the file's bytes to the soup of triangles.
+//! Reading: from the file's bytes to a list of triangles.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::ops::Range;
 
+use bytes::Bytes;
 use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::mesh::{TRIANGLE_FAN, TRIANGLE_STRIP, TRIANGLES};
 use serde_json::Value;
 
 use super::accessor::{Accessor, is_unsigned};
-use super::attributes::Attributes;
+use super::attributes::AttributeReader;
 use super::buffers::Document;
-use super::json::{Place, values_at_most};
-use super::scene::{Drawn, drawn};
+use super::error::ScanError;
+use super::json::{JsonPlace, values_at_most};
+use super::limits::{Limit, ScanLimits};
+use super::scan::{Scan, ScanPart, VertexBlock};
+use super::scene::{MeshNode, mesh_nodes};
 use super::skin::skinned_meshes;
-use super::triangles::Runs;
-use super::{Block, Part, Scan, ScanError, ScanLimits};
+use super::triangles::IndexList;
 use darn_geometry::mesh::{TriMesh, Vec3};
 
 const DRACO: &str = "KHR_draco_mesh_compression";
 const QUANTIZED: &str = "KHR_mesh_quantization";
 
-pub(super) fn read(bytes: &[u8], limits: &ScanLimits) -> Result<Scan, ScanError> {
-    let layout = super::container::layout(bytes)?;
+impl Scan {
+    /// Reads a scan. Its first bytes decide between GLB and JSON; only data URIs and the BIN chunk are read.
+    ///
+    /// The scan keeps `bytes` and does not copy them (a `Vec<u8>` is taken over, a slice needs
+    /// [`Bytes::copy_from_slice`]). Further memory: about 100 bytes a JSON value, 36 a vertex, 12 a face and 4 an
+    /// attribute value; `limits` bounds each before it is allocated.
+    ///
+    /// # Errors
+    /// See [`ScanError`]; a scan that draws no triangle is [`ScanError::NoTriangles`].
+    pub fn read(bytes: impl Into<Bytes>, limits: &ScanLimits) -> Result<Self, ScanError> {
+        read(bytes.into(), limits)
+    }
+}
+
+fn read(bytes: Bytes, limits: &ScanLimits) -> Result<Scan, ScanError> {
+    let layout = super::container::layout(&bytes)?;
     let text = bytes.get(layout.json.clone()).unwrap_or_default();
-    within(
-        limits.max_json_values,
-        "max_json_values",
-        values_at_most(text),
-        "",
-    )?;
+    let limit = Limit {
+        name: "max_json_values",
+        allowed: limits.max_json_values,
+    };
+    limit.check(values_at_most(text), "")?;
     let json = darn_json::value(text).map_err(|error| ScanError::Container {
         offset: layout.json.start + offset_of(text, error.line(), error.column()),
         detail: format!("the JSON does not parse: {error}"),
     })?;
-    let root = Place::root(&json);
+    let root = JsonPlace::root(&json);
     check_version(&root)?;
     let bin = layout.bin.clone().and_then(|range| bytes.get(range));
     let document = Document::new(root.clone(), bin)?;
-    let scene = drawn(&root, limits)?;
+    let nodes = mesh_nodes(&root, limits)?;
     let mut instances: HashMap<usize, usize> = HashMap::new();
-    for drawn in &scene {
-        *instances.entry(drawn.mesh).or_default() += 1;
+    for node in &nodes {
+        *instances.entry(node.mesh).or_default() += 1;
     }
-    let mut reader = Reader::new(&document, limits);
-    for drawn in &scene {
-        let first = reader.parts.len();
-        reader.mesh(drawn)?;
-        let fresh = reader.met.insert(drawn.mesh);
-        for part in reader.parts.iter_mut().skip(first) {
-            part.shared = instances.get(&drawn.mesh).is_some_and(|n| *n > 1);
-            part.first_instance = fresh;
-        }
+    let mut reader = ScanReader::new(&document, limits);
+    let mut met = BTreeSet::new();
+    for node in &nodes {
+        reader.read_mesh(&MeshInstance {
+            node,
+            shared: instances.get(&node.mesh).is_some_and(|n| *n > 1),
+            first: met.insert(node.mesh),
+        })?;
     }
-    let Reader {
+    let ScanReader {
         surface,
         parts,
         blocks,
@@ -64,13 +80,13 @@ pub(super) fn read(bytes: &[u8], limits: &ScanLimits) -> Result<Scan, ScanError>
         surface,
         parts,
         blocks,
-        bytes: bytes.to_vec(),
+        bytes,
         layout,
         json,
     })
 }
 
-fn check_version(root: &Place<'_>) -> Result<(), ScanError> {
+fn check_version(root: &JsonPlace<'_>) -> Result<(), ScanError> {
     let version = root.need("asset")?.need("version")?;
     match version.text()?.split_once('.') {
         Some(("2", _)) => Ok(()),
@@ -86,37 +102,31 @@ fn offset_of(text: &[u8], line: usize, column: usize) -> usize {
     lines.map(|line| line.len() + 1).sum::<usize>() + column.saturating_sub(1)
 }
 
-pub(super) fn within(
-    allowed: usize,
-    limit: &'static str,
-    found: usize,
-    pointer: &str,
-) -> Result<(), ScanError> {
-    if found <= allowed {
-        return Ok(());
-    }
-    Err(ScanError::Limit {
-        pointer: pointer.into(),
-        limit,
-        allowed,
-        found,
-    })
+/// One node that draws a mesh, and what other nodes draw the same mesh.
+struct MeshInstance<'s> {
+    node: &'s MeshNode,
+    /// Whether other nodes draw the mesh too.
+    shared: bool,
+    /// Whether no earlier node draws the mesh.
+    first: bool,
 }
 
-struct Reader<'d, 'a> {
+/// Collects the surface and its parts, and counts them against the limits.
+struct ScanReader<'d, 'a> {
     document: &'d Document<'a>,
     limits: &'d ScanLimits,
     surface: TriMesh,
-    parts: Vec<Part>,
-    blocks: Vec<Block>,
-    met: BTreeSet<usize>,
-    attributes: Attributes<'d, 'a>,
+    parts: Vec<ScanPart>,
+    blocks: Vec<VertexBlock>,
+    attributes: AttributeReader<'d, 'a>,
     skinned: BTreeSet<usize>,
+    /// Primitives so far, points and lines included.
     primitives: usize,
+    /// Triangles so far, degenerate ones included.
     faces: usize,
 }
 
-impl<'d, 'a> Reader<'d, 'a> {
+impl<'d, 'a> ScanReader<'d, 'a> {
     fn new(document: &'d Document<'a>, limits: &'d ScanLimits) -> Self {
         Self {
             document,
@@ -124,49 +134,44 @@ impl<'d, 'a> Reader<'d, 'a> {
             surface: TriMesh::default(),
             parts: Vec::new(),
             blocks: Vec::new(),
-            met: BTreeSet::new(),
-            attributes: Attributes::new(document, limits),
+            attributes: AttributeReader::new(document, limits),
             skinned: skinned_meshes(document.root.value),
             primitives: 0,
             faces: 0,
         }
     }
 
-    /// Adds the triangle primitives of a drawn mesh.
-    fn mesh(&mut self, drawn: &Drawn) -> Result<(), ScanError> {
+    /// Adds the triangle primitives of a mesh as one node draws it.
+    fn read_mesh(&mut self, instance: &MeshInstance<'_>) -> Result<(), ScanError> {
         let Some(meshes) = self.document.root.get("meshes")? else {
             return Ok(());
         };
-        let Some(mesh) = meshes.item(drawn.mesh)? else {
+        let Some(mesh) = meshes.item(instance.node.mesh)? else {
             return Ok(());
         };
-        // Blocks of this node by POSITION accessor; a BTreeMap only for its small size.
-        let mut blocks = BTreeMap::new();
+        // The node's vertices by POSITION accessor.
+        let mut vertices = BTreeMap::new();
         for (index, place) in mesh.need("primitives")?.items()?.enumerate() {
             self.primitives += 1;
-            within(
-                self.limits.max_primitives,
-                "max_primitives",
-                self.primitives,
-                &place.pointer,
-            )?;
-            if let Some(part) = self.primitive(drawn, &place, &mut blocks)? {
-                self.parts.push(Part {
-                    primitive: index,
-                    ..part
-                });
-            }
+            let limit = Limit {
+                name: "max_primitives",
+                allowed: self.limits.max_primitives,
+            };
+            limit.check(self.primitives, &place.pointer)?;
+            let part = self.read_primitive(instance, index, &place, &mut vertices)?;
+            self.parts.extend(part);
         }
         Ok(())
     }
 
     /// One primitive, or `None` when it draws no triangles (points, lines, no positions).
-    fn primitive(
+    fn read_primitive(
         &mut self,
-        drawn: &Drawn,
-        place: &Place<'a>,
-        blocks: &mut BTreeMap<usize, (u32, usize)>,
-    ) -> Result<Option<Part>, ScanError> {
+        instance: &MeshInstance<'_>,
+        index: usize,
+        place: &JsonPlace<'a>,
+        vertices_of: &mut BTreeMap<usize, Range<u32>>,
+    ) -> Result<Option<ScanPart>, ScanError> {
         let mode = u32::try_from(place.integer_or("mode", TRIANGLES as usize)?).unwrap_or(u32::MAX);
         if ![TRIANGLES, TRIANGLE_STRIP, TRIANGLE_FAN].contains(&mode) {
             return Ok(None);
@@ -177,7 +182,7 @@ impl<'d, 'a> Reader<'d, 'a> {
         };
         let (key, accessor) = self.document.root.referred("accessors", &position)?;
         if let Some(draco) = place.extension(DRACO)? {
-            // Unless it is required, plain accessors may be there as a fallback.
+            // If the file does not require the extension, plain accessors may be there as a fallback.
             if self.document.requires(DRACO) || accessor.get("bufferView")?.is_none() {
                 return Err(ScanError::Unsupported {
                     pointer: draco.pointer,
@@ -185,16 +190,18 @@ impl<'d, 'a> Reader<'d, 'a> {
                 });
             }
         }
-        let (start, count) = match blocks.get(&key) {
-            Some(block) => *block,
+        let node = instance.node;
+        let vertices = match vertices_of.get(&key) {
+            Some(vertices) => vertices.clone(),
             None => {
-                let block = self.positions(drawn, &accessor)?;
-                blocks.insert(key, block);
-                block
+                let vertices = self.read_positions(node, &accessor)?;
+                vertices_of.insert(key, vertices.clone());
+                vertices
             }
         };
-        let faces = self.triangles(place, mode, count)?;
-        let mirrored = drawn.placement.mirrors();
+        let (start, count) = (vertices.start, vertices.len());
+        let faces = self.read_triangles(place, mode, count)?;
+        let mirrored = node.transform.mirrors();
         let first = self.surface.faces.len() as u32;
         self.surface.faces.extend(
             faces
@@ -206,11 +213,9 @@ impl<'d, 'a> Reader<'d, 'a> {
                 }),
         );
         let normals = self.attributes.normals(&attributes, count)?;
-        let (texcoords, (color_kinds, colors)) = (
-            self.attributes.texcoords(&attributes, count)?,
-            self.attributes.colors(&attributes, count)?,
-        );
-        let skinned = self.skinned.contains(&drawn.mesh);
+        let texcoords = self.attributes.texcoords(&attributes, count)?;
+        let (color_kinds, colors) = self.attributes.colors(&attributes, count)?;
+        let skinned = self.skinned.contains(&node.mesh);
         let skinning = skinned
             .then(|| self.attributes.influences(&attributes, count))
             .transpose()?;
@@ -218,31 +223,35 @@ impl<'d, 'a> Reader<'d, 'a> {
             Some(reference) => Some(self.document.root.referred("materials", &reference)?.0),
             None => None,
         };
-        Ok(Some(Part {
-            node: drawn.node,
-            mesh: drawn.mesh,
-            primitive: 0,
+        Ok(Some(ScanPart {
+            node: node.index,
+            mesh: node.mesh,
+            primitive: index,
             material,
-            vertices: start..start + count as u32,
+            vertices,
             faces: first..self.surface.faces.len() as u32,
             texcoords,
             colors,
             normals,
             reconstructed: place.value.pointer("/extras/darn/reconstructed")
                 == Some(&Value::Bool(true)),
-            shared: false,
-            first_instance: false,
+            shared: instance.shared,
+            first_instance: instance.first,
             targets: place
                 .get("targets")?
                 .map_or(Ok(0), |targets| targets.array().map(<[_]>::len))?,
             color_kinds,
-            placement: drawn.placement.clone(),
+            transform: node.transform.clone(),
             skinning,
         }))
     }
 
-    /// Decodes a POSITION accessor as a new block of vertices; its first vertex and its length.
-    fn positions(&mut self, drawn: &Drawn, place: &Place<'a>) -> Result<(u32, usize), ScanError> {
+    /// Decodes a POSITION accessor as a new block of vertices; returns their range in the surface.
+    fn read_positions(
+        &mut self,
+        node: &MeshNode,
+        place: &JsonPlace<'a>,
+    ) -> Result<Range<u32>, ScanError> {
         let accessor = Accessor::open(self.document, place)?;
         if accessor.kind != Type::Vec3 {
             return Err(place.invalid("positions must be VEC3"));
@@ -254,13 +263,11 @@ impl<'d, 'a> Reader<'d, 'a> {
             });
         }
         let first = self.surface.positions.len();
-        let allowed = self.limits.max_vertices.min(u32::MAX as usize);
-        within(
-            allowed,
-            "max_vertices",
-            first.saturating_add(accessor.count),
-            &accessor.pointer,
-        )?;
+        let limit = Limit {
+            name: "max_vertices",
+            allowed: self.limits.max_vertices.min(u32::MAX as usize),
+        };
+        limit.check(first.saturating_add(accessor.count), &accessor.pointer)?;
         let local = accessor.floats([0.0_f32; 3])?;
         for (element, point) in local.iter().enumerate() {
             if !point.iter().all(|x| x.is_finite()) {
@@ -269,28 +276,28 @@ impl<'d, 'a> Reader<'d, 'a> {
                     element,
                 });
             }
-            let point = drawn.placement.point(Vec3::from(point.map(f64::from)));
+            let point = node.transform.point(Vec3::from(point.map(f64::from)));
             if !point.iter().all(|x| x.is_finite()) {
                 return Err(ScanError::NotFinite {
-                    pointer: format!("/nodes/{}", drawn.node),
+                    pointer: format!("/nodes/{}", node.index),
                     element,
                 });
             }
             self.surface.positions.push(point);
         }
-        let (start, count) = (first as u32, local.len());
-        self.blocks.push(Block {
-            node: drawn.node,
+        let (start, count) = (first as u32, local.len() as u32);
+        self.blocks.push(VertexBlock {
+            node: node.index,
             start,
             local,
         });
-        Ok((start, count))
+        Ok(start..start + count)
     }
 
     /// The triangles of a primitive, indices below `vertices`; degenerate ones included.
-    fn triangles(
+    fn read_triangles(
         &mut self,
-        place: &Place<'a>,
+        place: &JsonPlace<'a>,
         mode: u32,
         vertices: usize,
     ) -> Result<Vec<[u32; 3]>, ScanError> {
@@ -301,7 +308,7 @@ impl<'d, 'a> Reader<'d, 'a> {
                 if accessor.kind != Type::Scalar || !is_unsigned(accessor.component) {
                     return Err(place.invalid("indices must be unsigned scalars"));
                 }
-                self.bound_faces(mode, accessor.count, &accessor.pointer)?;
+                self.count_faces(mode, accessor.count, &accessor.pointer)?;
                 let restart = match (mode, accessor.component) {
                     (TRIANGLES, _) => None,
                     (_, ComponentType::U8) => Some(u32::from(u8::MAX)),
@@ -320,11 +327,11 @@ impl<'d, 'a> Reader<'d, 'a> {
                         vertices,
                     });
                 }
-                Runs { indices, restart }
+                IndexList { indices, restart }
             }
             None => {
-                self.bound_faces(mode, vertices, &place.pointer)?;
-                Runs {
+                self.count_faces(mode, vertices, &place.pointer)?;
+                IndexList {
                     indices: (0..vertices as u32).collect(),
                     restart: None,
                 }
@@ -333,13 +340,18 @@ impl<'d, 'a> Reader<'d, 'a> {
         Ok(indices.triangles(mode))
     }
 
-    fn bound_faces(&mut self, mode: u32, indices: usize, pointer: &str) -> Result<(), ScanError> {
+    /// Counts the triangles of so many indices against the limit.
+    fn count_faces(&mut self, mode: u32, indices: usize, pointer: &str) -> Result<(), ScanError> {
         let faces = if mode == TRIANGLES {
             indices / 3
         } else {
             indices.saturating_sub(2)
         };
         self.faces = self.faces.saturating_add(faces);
-        within(self.limits.max_faces, "max_faces", self.faces, pointer)
+        let limit = Limit {
+            name: "max_faces",
+            allowed: self.limits.max_faces,
+        };
+        limit.check(self.faces, pointer)
     }
 }

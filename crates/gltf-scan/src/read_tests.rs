@@ -1,4 +1,4 @@
-//! What reading a scan must hold to.
+//! Laws of reading a scan.
 
 use proptest::prelude::*;
 use serde_json::{Value, json};
@@ -9,7 +9,7 @@ use super::{Container, Scan, ScanError, ScanLimits};
 use darn_geometry::mesh::Vec3;
 
 fn read(bytes: &[u8]) -> Result<Scan, ScanError> {
-    Scan::read(bytes, &ScanLimits::default())
+    Scan::read(bytes.to_vec(), &ScanLimits::default())
 }
 
 /// The error of a unit square after an edit of its JSON.
@@ -122,7 +122,7 @@ fn sparse_values_replace_zeros() {
 }
 
 #[test]
-fn transforms_accumulate_and_mirrors_turn_faces() {
+fn transforms_accumulate_and_mirrors_reverse_faces() {
     let mut scan = Builder::square();
     let matrix = [
         0.0,
@@ -154,7 +154,7 @@ fn transforms_accumulate_and_mirrors_turn_faces() {
 }
 
 #[test]
-fn a_skinned_mesh_stands_where_its_positions_say_and_its_nodes_children_where_the_node_does() {
+fn a_node_transform_moves_its_children_but_not_its_skinned_mesh() {
     let mut scan = Builder::skinned();
     scan.json["nodes"][0]["children"] = json!([3]);
     scan.push("nodes", json!({"mesh": 0}));
@@ -171,7 +171,7 @@ fn a_skinned_mesh_stands_where_its_positions_say_and_its_nodes_children_where_th
 #[test]
 fn joint_and_weight_types_decode() {
     let mut scan = Builder::skinned();
-    // Shorts with a gap after each four; weights that are all sparse.
+    // Shorts with a gap after every four; all weights sparse.
     let joints: Vec<u8> = [0_u16, 700, 2, 3, 9, 9]
         .repeat(4)
         .iter()
@@ -206,7 +206,7 @@ fn joint_and_weight_types_decode() {
 }
 
 #[test]
-fn joints_and_weights_that_are_none_are_named() {
+fn invalid_joints_and_weights_are_named() {
     let cases = [
         ("/accessors/2", "componentType", json!(5120)),
         ("/accessors/2", "count", json!(3)),
@@ -223,7 +223,7 @@ fn joints_and_weights_that_are_none_are_named() {
         max_attribute_values: 31,
         ..ScanLimits::default()
     };
-    let error = Scan::read(&Builder::skinned().glb(), &tight).unwrap_err();
+    let error = Scan::read(Builder::skinned().glb(), &tight).unwrap_err();
     assert!(
         error.to_string().contains("max_attribute_values = 31"),
         "{error}"
@@ -231,7 +231,7 @@ fn joints_and_weights_that_are_none_are_named() {
 }
 
 #[test]
-fn morph_targets_that_are_on_by_default_are_told() {
+fn morph_targets_that_are_on_by_default_are_reported() {
     let posed = |mesh: Value, node: Value, targets: usize| {
         let mut scan = Builder::square();
         scan.json["meshes"][0]["weights"] = mesh;
@@ -253,7 +253,7 @@ fn morph_targets_that_are_on_by_default_are_told() {
 }
 
 #[test]
-fn instances_are_read_and_told_apart() {
+fn instances_are_read_and_marked() {
     let mut scan = Builder::square();
     scan.json["nodes"] =
         json!([{"mesh": 0, "children": [1]}, {"mesh": 0, "translation": [0, 0, 1]}]);
@@ -398,7 +398,7 @@ fn positions_that_are_not_finite_and_indices_out_of_range_are_named() {
 #[test]
 fn limits_are_named_with_their_value() {
     let glb = Builder::square().glb();
-    let tight = |limits: ScanLimits| Scan::read(&glb, &limits).unwrap_err().to_string();
+    let tight = |limits: ScanLimits| Scan::read(glb.clone(), &limits).unwrap_err().to_string();
     let all = ScanLimits::default();
     for (text, limits) in [
         (
@@ -472,7 +472,7 @@ proptest! {
         scan.primitive(json!({"attributes": {"POSITION": position}}));
         let scan = read(&scan.gltf()).unwrap();
         for (vertex, point) in points.iter().enumerate() {
-            let (_, stored) = scan.stored(vertex as u32).unwrap();
+            let (_, stored) = scan.stored_position(vertex as u32).unwrap();
             prop_assert_eq!(stored.map(f32::to_bits), point.map(f32::to_bits));
         }
     }

@@ -1,27 +1,28 @@
-//! The node hierarchy of the default scene: which meshes are drawn, and where.
+//! The node hierarchy of the default scene: which nodes draw which meshes, and with which transform.
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion};
 
-use super::json::Place;
-use super::{ScanError, ScanLimits};
+use super::error::ScanError;
+use super::json::JsonPlace;
+use super::limits::{Limit, ScanLimits};
 use darn_geometry::mesh::Vec3;
 
-/// An affine map, accumulated in f64: x ↦ `linear` x + `offset`.
+/// The transform from a node's space to the scene, accumulated in f64: x ↦ `linear` x + `offset`.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Placement {
+pub(super) struct NodeTransform {
     pub linear: Matrix3<f64>,
     pub offset: Vec3,
 }
 
 /// A node of the default scene that draws a mesh.
 #[derive(Debug, Clone)]
-pub(super) struct Drawn {
-    pub node: usize,
+pub(super) struct MeshNode {
+    pub index: usize,
     pub mesh: usize,
-    pub placement: Placement,
+    pub transform: NodeTransform,
 }
 
-impl Placement {
+impl NodeTransform {
     pub fn identity() -> Self {
         Self {
             linear: Matrix3::identity(),
@@ -29,16 +30,17 @@ impl Placement {
         }
     }
 
+    /// A point of the node's space in the scene.
     pub fn point(&self, local: Vec3) -> Vec3 {
         self.linear * local + self.offset
     }
 
-    /// Whether faces turn round: a negative determinant (glTF 2.0, 3.7.4).
+    /// Whether the transform reverses the winding of faces: a negative determinant (glTF 2.0, 3.7.4).
     pub fn mirrors(&self) -> bool {
         self.linear.determinant() < 0.0
     }
 
-    /// The map back, or `None` when this one flattens space (relative volume below 1e-12).
+    /// The inverse, or `None` if the transform is singular (relative volume below 1e-12).
     pub fn inverse(&self) -> Option<Self> {
         let volume: f64 = self
             .linear
@@ -56,6 +58,7 @@ impl Placement {
         })
     }
 
+    /// The transform of a child whose own transform is `child`.
     fn then(&self, child: &Self) -> Self {
         Self {
             linear: self.linear * child.linear,
@@ -64,11 +67,14 @@ impl Placement {
     }
 }
 
-/// The drawn meshes of the default scene, depth first in the file's order.
+/// The nodes of the default scene that draw a mesh, depth first in the file's order.
 ///
-/// Without `scene` the first scene is taken, without scenes every node that is nobody's child. Skins are not applied: a skinned
-/// mesh stands in its bind pose, as stored, untouched by its node's transform; morph targets likewise have weight 0.
-pub(super) fn drawn(root: &Place<'_>, limits: &ScanLimits) -> Result<Vec<Drawn>, ScanError> {
+/// Without `scene` the first scene is taken; without scenes, every node that is no node's child. Skins are not applied:
+/// a skinned mesh keeps its stored positions and ignores its node's transform. Morph targets have weight 0.
+pub(super) fn mesh_nodes(
+    root: &JsonPlace<'_>,
+    limits: &ScanLimits,
+) -> Result<Vec<MeshNode>, ScanError> {
     let nodes = match root.get("nodes")? {
         Some(nodes) => nodes.array()?.len(),
         None => return Ok(Vec::new()),
@@ -77,50 +83,47 @@ pub(super) fn drawn(root: &Place<'_>, limits: &ScanLimits) -> Result<Vec<Drawn>,
     let mut open = roots(root)?;
     open.reverse();
     let (mut out, mut visited) = (Vec::new(), 0);
-    while let Some(Step {
-        from,
+    while let Some(NodeVisit {
+        reference,
         index,
         node,
         parent,
     }) = open.pop()
     {
         visited += 1;
-        if visited > limits.max_nodes {
-            return Err(ScanError::Limit {
-                pointer: node.pointer,
-                limit: "max_nodes",
-                allowed: limits.max_nodes,
-                found: visited,
-            });
-        }
+        let limit = Limit {
+            name: "max_nodes",
+            allowed: limits.max_nodes,
+        };
+        limit.check(visited, &node.pointer)?;
         if seen
             .get_mut(index)
             .is_none_or(|seen| std::mem::replace(seen, true))
         {
             let detail = format!("node {index} is reached a second time: a cycle or two parents");
             return Err(ScanError::Invalid {
-                pointer: from,
+                pointer: reference,
                 detail,
             });
         }
-        let placement = parent.then(&local(&node)?);
-        if let Some(reference) = node.get("mesh")? {
-            let (mesh, _) = root.referred("meshes", &reference)?;
-            // Only its joints move a skinned mesh (glTF 2.0, 3.7.3.3).
-            let placement = match node.get("skin")? {
-                Some(_) => Placement::identity(),
-                None => placement.clone(),
+        let transform = parent.then(&local(&node)?);
+        if let Some(mesh) = node.get("mesh")? {
+            let (mesh, _) = root.referred("meshes", &mesh)?;
+            // Only joints move a skinned mesh, its node does not (glTF 2.0, 3.7.3.3).
+            let transform = match node.get("skin")? {
+                Some(_) => NodeTransform::identity(),
+                None => transform.clone(),
             };
-            out.push(Drawn {
-                node: index,
+            out.push(MeshNode {
+                index,
                 mesh,
-                placement,
+                transform,
             });
         }
         if let Some(children) = node.get("children")? {
             let first = open.len();
             for child in children.items()? {
-                open.push(Step::new(root, child, placement.clone())?);
+                open.push(NodeVisit::new(root, child, transform.clone())?);
             }
             if let Some(children) = open.get_mut(first..) {
                 children.reverse();
@@ -130,20 +133,24 @@ pub(super) fn drawn(root: &Place<'_>, limits: &ScanLimits) -> Result<Vec<Drawn>,
     Ok(out)
 }
 
-/// A node still to be visited.
-struct Step<'a> {
-    /// Pointer to what refers to it.
-    from: String,
+/// A node to visit.
+struct NodeVisit<'a> {
+    /// JSON pointer to what refers to it.
+    reference: String,
     index: usize,
-    node: Place<'a>,
-    parent: Placement,
+    node: JsonPlace<'a>,
+    parent: NodeTransform,
 }
 
-impl<'a> Step<'a> {
-    fn new(root: &Place<'a>, reference: Place<'a>, parent: Placement) -> Result<Self, ScanError> {
+impl<'a> NodeVisit<'a> {
+    fn new(
+        root: &JsonPlace<'a>,
+        reference: JsonPlace<'a>,
+        parent: NodeTransform,
+    ) -> Result<Self, ScanError> {
         let (index, node) = root.referred("nodes", &reference)?;
         Ok(Self {
-            from: reference.pointer,
+            reference: reference.pointer,
             index,
             node,
             parent,
@@ -152,7 +159,7 @@ impl<'a> Step<'a> {
 }
 
 /// The root nodes of the default scene.
-fn roots<'a>(root: &Place<'a>) -> Result<Vec<Step<'a>>, ScanError> {
+fn roots<'a>(root: &JsonPlace<'a>) -> Result<Vec<NodeVisit<'a>>, ScanError> {
     let scene = match (root.get("scene")?, root.get("scenes")?) {
         (Some(reference), _) => Some(root.referred("scenes", &reference)?.1),
         (None, Some(scenes)) => scenes.items()?.next(),
@@ -164,15 +171,15 @@ fn roots<'a>(root: &Place<'a>) -> Result<Vec<Step<'a>>, ScanError> {
     match scene.get("nodes")? {
         Some(nodes) => nodes
             .items()?
-            .map(|node| Step::new(root, node, Placement::identity()))
+            .map(|node| NodeVisit::new(root, node, NodeTransform::identity()))
             .collect(),
         None => Ok(Vec::new()),
     }
 }
 
-/// The nodes that are nobody's child.
-fn orphans<'a>(root: &Place<'a>) -> Result<Vec<Step<'a>>, ScanError> {
-    let nodes: Vec<Place<'a>> = root.need("nodes")?.items()?.collect();
+/// The nodes that are no node's child.
+fn orphans<'a>(root: &JsonPlace<'a>) -> Result<Vec<NodeVisit<'a>>, ScanError> {
+    let nodes: Vec<JsonPlace<'a>> = root.need("nodes")?.items()?.collect();
     let mut child = vec![false; nodes.len()];
     for node in &nodes {
         if let Some(children) = node.get("children")? {
@@ -191,17 +198,17 @@ fn orphans<'a>(root: &Place<'a>) -> Result<Vec<Step<'a>>, ScanError> {
         .enumerate()
         .zip(child)
         .filter(|(_, child)| !child)
-        .map(|((index, node), _)| Step {
-            from: node.pointer.clone(),
+        .map(|((index, node), _)| NodeVisit {
+            reference: node.pointer.clone(),
             index,
             node,
-            parent: Placement::identity(),
+            parent: NodeTransform::identity(),
         });
     Ok(steps.collect())
 }
 
-/// A node's own transform: its matrix, or translation · rotation · scale.
-fn local(node: &Place<'_>) -> Result<Placement, ScanError> {
+/// A node's transform relative to its parent: its matrix, or translation · rotation · scale.
+fn local(node: &JsonPlace<'_>) -> Result<NodeTransform, ScanError> {
     if let Some(place) = node.get("matrix")? {
         let m = place.numbers::<16>()?;
         let affine = [m[3], m[7], m[11], m[15] - 1.0]
@@ -210,7 +217,7 @@ fn local(node: &Place<'_>) -> Result<Placement, ScanError> {
         if !affine {
             return Err(place.invalid("the last row must be 0 0 0 1"));
         }
-        return Ok(Placement {
+        return Ok(NodeTransform {
             linear: Matrix3::new(m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10]),
             offset: Vec3::new(m[12], m[13], m[14]),
         });
@@ -224,7 +231,7 @@ fn local(node: &Place<'_>) -> Result<Placement, ScanError> {
     let rotation = match node.get("rotation")? {
         Some(place) => {
             let [x, y, z, w] = place.numbers::<4>()?;
-            // Stored quaternions are unit only up to their rounding.
+            // Stored quaternions are unit only up to rounding.
             UnitQuaternion::try_new(Quaternion::new(w, x, y, z), f64::MIN_POSITIVE)
                 .ok_or_else(|| place.invalid("must be a unit quaternion"))?
                 .to_rotation_matrix()
@@ -232,7 +239,7 @@ fn local(node: &Place<'_>) -> Result<Placement, ScanError> {
         }
         None => Matrix3::identity(),
     };
-    Ok(Placement {
+    Ok(NodeTransform {
         linear: rotation * scale,
         offset,
     })

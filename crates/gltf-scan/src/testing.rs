@@ -1,4 +1,4 @@
-//! Small scans built by hand, for tests.
+//! Small scans for tests.
 
 use serde_json::{Value, json};
 
@@ -12,7 +12,7 @@ pub(crate) struct Builder {
 }
 
 impl Builder {
-    /// A scene of one node with one mesh without primitives.
+    /// A scene of one node with one mesh, which has no primitives yet.
     pub fn new() -> Self {
         let json = json!({
             "asset": {"version": "2.0", "extras": {"accession": "TX.1923.14"}},
@@ -48,7 +48,8 @@ impl Builder {
         out
     }
 
-    /// The unit square under a skin of two joints, the second of which draws most at the corner (1, 0, 0); its node stands elsewhere.
+    /// The unit square with a skin of two joints; the second has most weight at the corner (1, 0, 0). Its node has
+    /// another transform.
     pub fn skinned() -> Self {
         let mut out = Self::square();
         let joints = out.accessor(&[0_u8, 1, 0, 0].repeat(4), 5121, "VEC4", 4);
@@ -71,7 +72,7 @@ impl Builder {
         out
     }
 
-    /// Appends a buffer view; its index.
+    /// Appends a buffer view; returns its index.
     pub fn view(&mut self, bytes: &[u8]) -> usize {
         self.bin.resize(self.bin.len().next_multiple_of(4), 0);
         let view = json!({"buffer": 0, "byteOffset": self.bin.len(), "byteLength": bytes.len()});
@@ -79,7 +80,7 @@ impl Builder {
         self.push("bufferViews", view)
     }
 
-    /// Appends an accessor over a view of its own; its index.
+    /// Appends an accessor over a view of its own; returns its index.
     pub fn accessor(&mut self, bytes: &[u8], component: u32, kind: &str, count: usize) -> usize {
         let view = self.view(bytes);
         self.push(
@@ -88,7 +89,7 @@ impl Builder {
         )
     }
 
-    /// Appends an f32 accessor, VEC`N` with the bounds of its values; its index.
+    /// Appends an f32 accessor, VEC`N` with the bounds of its values; returns its index.
     pub fn floats<const N: usize>(&mut self, values: &[[f32; N]]) -> usize {
         let bytes: Vec<u8> = values
             .iter()
@@ -106,6 +107,7 @@ impl Builder {
         at
     }
 
+    /// Appends an accessor of u16 indices; returns its index.
     pub fn indices_u16(&mut self, indices: &[u16]) -> usize {
         let bytes: Vec<u8> = indices.iter().flat_map(|i| i.to_le_bytes()).collect();
         self.accessor(&bytes, 5123, "SCALAR", indices.len())
@@ -118,7 +120,7 @@ impl Builder {
         }
     }
 
-    /// Appends to a list at the top of the JSON; the new index.
+    /// Appends to a list at the top of the JSON; returns the new index.
     pub fn push(&mut self, key: &str, value: Value) -> usize {
         let list = self.json[key].as_array_mut().expect("a list");
         list.push(value);
@@ -131,7 +133,7 @@ impl Builder {
         self.glb_as_is()
     }
 
-    /// The scan as a GLB whose first buffer keeps the length that the test gave it.
+    /// The scan as a GLB; the length of the first buffer is what the test has set.
     pub fn glb_as_is(self) -> Vec<u8> {
         pack_glb(self.json.to_string().as_bytes(), Some(&self.bin), &[]).expect("a small scan")
     }

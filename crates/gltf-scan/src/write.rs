@@ -1,4 +1,4 @@
-//! Patches as primitives of the meshes they mend.
+//! Writing: checks patches and appends them as primitives of the meshes they mend.
 
 use std::collections::HashMap;
 
@@ -6,82 +6,60 @@ use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::mesh::TRIANGLES;
 use serde_json::{Map, Value, json};
 
-use super::append::{Appender, Content, Target};
-use super::skin::{self, Influence};
-use super::{Part, Scan, ScanError};
+use super::append::{AccessorData, Appender, Bounds};
+use super::buffers::BufferTarget;
+use super::container::float_bytes;
+use super::error::ScanError;
+use super::patch_primitive::{PatchPoint, PatchPrimitive};
+use super::patch_skin::patch_influences;
+use super::scan::{Scan, ScanPart};
+use super::skin::Influence;
 use darn_geometry::mesh::Vec3;
 
-/// A patch to append to the scan as a primitive of its own.
-///
-/// Its attributes follow the part whose material it takes: with normals if that has them, and as many texture coordinate and
-/// colour sets, each `[points.len()]`. What moves it on a skinned mesh comes from the scan's vertices among its points.
-#[derive(Debug, Clone)]
-pub struct Addition {
-    /// Index into `Scan::parts` of a part of the mesh and node that take the patch.
-    pub part: usize,
-    /// Index into `Scan::parts` of the part whose material is copied.
-    pub material_of: usize,
-    /// The patch's vertices.
-    pub points: Vec<PatchPoint>,
-    /// Triangles over `points`, counter-clockwise in scene space.
-    pub faces: Vec<[u32; 3]>,
-    /// Whether it is drawn once more with its other side out, as scans are that have two triangles for each piece of cloth.
-    pub both_sides: bool,
-    /// Normals in scene space, of any length but zero; not read if the part has none.
-    pub normals: Vec<Vec3>,
-    /// Texture coordinate sets.
-    pub texcoords: Vec<Vec<[f32; 2]>>,
-    /// Colour sets, linear RGBA.
-    pub colors: Vec<Vec<[f32; 4]>>,
-    /// Name of the new accessors and buffer views.
-    pub name: String,
-    /// What is to be known about the patch: `extras.darn` of its primitive.
-    pub extras: Value,
-}
-
-/// A vertex of a patch.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum PatchPoint {
-    /// A vertex of `Scan::surface`. Its stored position is copied bit for bit if it belongs to the node that takes the patch.
-    Scan(u32),
-    /// A point in scene space, brought to the node's space and rounded to f32.
-    New(Vec3),
-}
-
-/// How far the squared length of a stored normal may be from 1; the validator allows about half of it.
+/// How far the squared length of a stored normal may be from 1; the glTF validator allows about half of it.
 const UNIT: f32 = 1e-3;
 
 const RECONSTRUCTION: &str = "darn reconstruction";
 
-pub(super) fn write(scan: &Scan, additions: &[Addition]) -> Result<Vec<u8>, ScanError> {
-    if additions.is_empty() {
-        return Ok(scan.bytes.clone());
-    }
-    let mut out = Appender::new(scan);
-    let mut materials = HashMap::new();
-    for (index, addition) in additions.iter().enumerate() {
-        let patch = Patch::check(scan, addition, index)?;
-        let material = match patch.look.material {
-            Some(source) => Some(match materials.get(&source) {
-                Some(copy) => *copy,
-                None => {
-                    let copy = copy_material(scan, &mut out, source)?;
-                    materials.insert(source, copy);
-                    copy
-                }
-            }),
-            None => None,
-        };
-        let front = patch.primitive(&mut out, material);
-        let back = (addition.both_sides).then(|| patch.back(&mut out, &front));
-        for primitive in [front].into_iter().chain(back) {
-            out.primitive(patch.home.mesh, primitive);
+impl Scan {
+    /// The scan with patches appended, in the container it was read from. Without patches: the bytes that were read.
+    ///
+    /// Everything that was there keeps its value, spelling and index; the BIN chunk keeps its bytes as a prefix.
+    ///
+    /// # Errors
+    /// [`ScanError::InvalidPatch`] for a patch that contradicts itself or the scan, [`ScanError::Singular`] for one on
+    /// a node whose transform is singular.
+    pub fn write(&self, patches: &[PatchPrimitive]) -> Result<Vec<u8>, ScanError> {
+        if patches.is_empty() {
+            return Ok(self.bytes.to_vec());
         }
+        let mut out = Appender::new(self);
+        let mut materials = HashMap::new();
+        for (index, patch) in patches.iter().enumerate() {
+            let checked = CheckedPatch::new(self, patch, index)?;
+            let material = match checked.look.material {
+                Some(source) => Some(match materials.get(&source) {
+                    Some(copy) => *copy,
+                    None => {
+                        let copy = copy_material(self, &mut out, source)?;
+                        materials.insert(source, copy);
+                        copy
+                    }
+                }),
+                None => None,
+            };
+            let front = checked.front(&mut out, material);
+            let back = (patch.both_sides).then(|| checked.back(&mut out, &front));
+            for primitive in [front].into_iter().chain(back) {
+                out.primitive(checked.home.mesh, primitive);
+            }
+        }
+        out.finish()
     }
-    out.finish()
 }
 
-/// Appends a copy of a material that says it is a reconstruction; its index. A material that already says so serves as it is.
+/// Appends a copy of a material that is marked as a reconstruction, and returns its index. A material that has the mark
+/// is used as it is.
 fn copy_material(scan: &Scan, out: &mut Appender<'_>, source: usize) -> Result<usize, ScanError> {
     let invalid = || ScanError::Invalid {
         pointer: format!("/materials/{source}"),
@@ -102,9 +80,9 @@ fn copy_material(scan: &Scan, out: &mut Appender<'_>, source: usize) -> Result<u
     copy.as_object_mut()
         .ok_or_else(invalid)?
         .insert("name".into(), name.into());
-    // Extras that are no object have no room for ours; the primitive's extras say it all the same.
-    if let Some(darn) = inner(&mut copy, "extras")
-        .and_then(|extras| inner(extras, "darn"))
+    // Extras that are not an object cannot take the mark; the primitive's extras have it too.
+    if let Some(darn) = member_object(&mut copy, "extras")
+        .and_then(|extras| member_object(extras, "darn"))
         .and_then(Value::as_object_mut)
     {
         darn.insert("reconstructed".into(), Value::Bool(true));
@@ -112,32 +90,39 @@ fn copy_material(scan: &Scan, out: &mut Appender<'_>, source: usize) -> Result<u
     Ok(out.push("materials", copy))
 }
 
-/// The object `key` of an object, made if it is not there; `None` if something else stands there.
-fn inner<'v>(object: &'v mut Value, key: &str) -> Option<&'v mut Value> {
-    let inner = object
+/// The object `key` of an object, created if it is missing; `None` if `key` is something else.
+fn member_object<'v>(object: &'v mut Value, key: &str) -> Option<&'v mut Value> {
+    let member = object
         .as_object_mut()?
         .entry(key)
         .or_insert_with(|| Value::Object(Map::new()));
-    inner.is_object().then_some(inner)
+    member.is_object().then_some(member)
 }
 
-/// An addition that has been checked against the scan.
-struct Patch<'s> {
-    addition: &'s Addition,
+/// The side of the cloth that a primitive of a patch shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum PatchSide {
+    Front,
+    Back,
+}
+
+/// A patch that has been checked against the scan.
+struct CheckedPatch<'s> {
+    patch: &'s PatchPrimitive,
     /// The part whose mesh and node take the patch.
-    home: &'s Part,
-    /// The part whose material and attributes it has.
-    look: &'s Part,
+    home: &'s ScanPart,
+    /// The part whose material and attributes the patch takes.
+    look: &'s ScanPart,
     /// Positions in the node's space.
     points: Vec<[f32; 3]>,
     /// Sets of joints and weights; none if the mesh has no skin.
     skinning: Vec<Vec<Influence>>,
 }
 
-impl<'s> Patch<'s> {
-    fn check(scan: &'s Scan, addition: &'s Addition, index: usize) -> Result<Self, ScanError> {
-        let fail = |detail: String| ScanError::Addition {
-            addition: index,
+impl<'s> CheckedPatch<'s> {
+    fn new(scan: &'s Scan, patch: &'s PatchPrimitive, index: usize) -> Result<Self, ScanError> {
+        let fail = |detail: String| ScanError::InvalidPatch {
+            patch: index,
             detail,
         };
         let part = |at: usize| {
@@ -145,75 +130,34 @@ impl<'s> Patch<'s> {
                 .get(at)
                 .ok_or_else(|| fail(format!("there is no part {at}")))
         };
-        let (home, look) = (part(addition.part)?, part(addition.material_of)?);
-        let n = addition.points.len();
-        if addition.faces.is_empty() || u32::try_from(n).is_err() {
-            return Err(fail(format!(
-                "{} faces over {n} points",
-                addition.faces.len()
-            )));
-        }
-        if let Some(face) = addition
-            .faces
-            .iter()
-            .find(|face| face.iter().any(|v| *v as usize >= n))
-        {
-            return Err(fail(format!("face {face:?} goes past the {n} points")));
-        }
-        if look.normals.is_some() {
-            expect_count(addition.normals.len(), n, "normals").map_err(fail)?;
-        }
-        expect_count(
-            addition.texcoords.len(),
-            look.texcoords.len(),
-            "texture coordinate sets",
-        )
-        .map_err(fail)?;
-        expect_count(addition.colors.len(), look.colors.len(), "colour sets").map_err(fail)?;
-        for set in &addition.texcoords {
-            expect_count(set.len(), n, "texture coordinates").map_err(fail)?;
-        }
-        for set in &addition.colors {
-            expect_count(set.len(), n, "colours").map_err(fail)?;
-        }
-        let finite = addition
-            .texcoords
-            .iter()
-            .flatten()
-            .flatten()
-            .all(|x| x.is_finite())
-            && addition
-                .colors
-                .iter()
-                .flatten()
-                .flatten()
-                .all(|x| x.is_finite());
-        if !finite {
-            return Err(fail("a texture coordinate or colour is not finite".into()));
-        }
-        let inverse = home.placement.inverse();
-        let mut points = Vec::with_capacity(n);
-        for (k, point) in addition.points.iter().enumerate() {
-            let point = match *point {
-                PatchPoint::Scan(vertex) => match scan.stored(vertex) {
-                    Some((node, local)) if node == home.node => Ok(local),
-                    _ => Err(*scan.surface.positions.get(vertex as usize).ok_or_else(|| {
+        let (home, look) = (part(patch.part)?, part(patch.material_of)?);
+        check_values(patch, look).map_err(fail)?;
+        let inverse = home.transform.inverse();
+        let mut points = Vec::with_capacity(patch.points.len());
+        for (k, point) in patch.points.iter().enumerate() {
+            let local = match *point {
+                PatchPoint::Scan(vertex) => stored_on(scan, home, vertex),
+                PatchPoint::New(_) => None,
+            };
+            if let Some(local) = local {
+                points.push(local);
+                continue;
+            }
+            let in_scene = match *point {
+                PatchPoint::New(point) => point,
+                PatchPoint::Scan(vertex) => {
+                    let position = scan.surface.positions.get(vertex as usize);
+                    *position.ok_or_else(|| {
                         fail(format!(
                             "point {k} is vertex {vertex}, which the scan does not have"
                         ))
-                    })?),
-                },
-                PatchPoint::New(point) => Err(point),
-            };
-            let local = match point {
-                Ok(local) => local,
-                Err(scene) => {
-                    let inverse = inverse
-                        .as_ref()
-                        .ok_or(ScanError::Singular { node: home.node })?;
-                    inverse.point(scene).map(|x| x as f32).into()
+                    })?
                 }
             };
+            let inverse = inverse
+                .as_ref()
+                .ok_or(ScanError::Singular { node: home.node })?;
+            let local: [f32; 3] = inverse.point(in_scene).map(|x| x as f32).into();
             if !local.iter().all(|x| x.is_finite()) {
                 return Err(fail(format!(
                     "point {k} is not finite in the space of node {}",
@@ -223,11 +167,11 @@ impl<'s> Patch<'s> {
             points.push(local);
         }
         let skinning = match home.skinning {
-            Some(_) => skin::carried(scan, home, &addition.points, &points),
+            Some(_) => patch_influences(scan, home, &patch.points, &points),
             None => Vec::new(),
         };
         Ok(Self {
-            addition,
+            patch,
             home,
             look,
             points,
@@ -235,74 +179,47 @@ impl<'s> Patch<'s> {
         })
     }
 
-    /// Appends the patch's accessors; the primitive over them.
-    fn primitive(&self, out: &mut Appender<'_>, material: Option<usize>) -> Value {
-        let addition = self.addition;
+    /// Appends the accessors of the patch's front; returns the primitive with them.
+    fn front(&self, out: &mut Appender<'_>, material: Option<usize>) -> Value {
+        let patch = self.patch;
         let mut attributes = Map::new();
-        let floats = |out: &mut Appender<'_>, kind: Type, bytes: Vec<u8>, bounds| {
-            let (name, target, component) =
-                (addition.name.as_str(), Target::Vertices, ComponentType::F32);
-            out.accessor(Content {
-                name,
-                target,
-                component,
-                kind,
-                bytes,
-                bounds,
-            })
-        };
-        let position = floats(
-            out,
-            Type::Vec3,
-            bytes_of(&self.points),
-            Some(bounds(&self.points)),
-        );
-        attributes.insert("POSITION".into(), position);
+        let bounds = Some(Bounds::of(&self.points));
+        attributes.insert("POSITION".into(), self.floats(out, &self.points, bounds));
         if self.look.normals.is_some() {
-            attributes.insert(
-                "NORMAL".into(),
-                floats(out, Type::Vec3, bytes_of(&self.normals()), None),
-            );
+            let normals = self.floats(out, &self.normals(), None);
+            attributes.insert("NORMAL".into(), normals);
         }
-        for (n, set) in addition.texcoords.iter().enumerate() {
-            attributes.insert(
-                format!("TEXCOORD_{n}"),
-                floats(out, Type::Vec2, bytes_of(set), None),
-            );
+        for (n, set) in patch.texcoords.iter().enumerate() {
+            attributes.insert(format!("TEXCOORD_{n}"), self.floats(out, set, None));
         }
-        for (n, (set, kind)) in addition
-            .colors
-            .iter()
-            .zip(&self.look.color_kinds)
-            .enumerate()
-        {
-            let bytes = match kind {
-                Type::Vec3 => bytes_of(
-                    &set.iter()
-                        .map(|&[r, g, b, _]| [r, g, b])
-                        .collect::<Vec<_>>(),
-                ),
-                _ => bytes_of(set),
+        let colors = patch.colors.iter().zip(&self.look.color_kinds);
+        for (n, (set, kind)) in colors.enumerate() {
+            let set = match kind {
+                Type::Vec3 => {
+                    let rgb: Vec<[f32; 3]> = set.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
+                    self.floats(out, &rgb, None)
+                }
+                _ => self.floats(out, set, None),
             };
-            attributes.insert(format!("COLOR_{n}"), floats(out, *kind, bytes, None));
+            attributes.insert(format!("COLOR_{n}"), set);
         }
         for (n, set) in self.skinning.iter().enumerate() {
             let weights: Vec<_> = set.iter().map(|influence| influence.weights).collect();
-            let weights = floats(out, Type::Vec4, bytes_of(&weights), None);
+            let weights = self.floats(out, &weights, None);
             attributes.insert(format!("JOINTS_{n}"), self.joints(out, set));
             attributes.insert(format!("WEIGHTS_{n}"), weights);
         }
         let targets = if self.home.targets > 0 {
-            // All primitives of a mesh must have as many targets; this one does not move with any.
+            // All primitives of a mesh must have the same number of targets; none moves the patch.
             let still = vec![[0.0; 3]; self.points.len()];
-            let still = floats(out, Type::Vec3, bytes_of(&still), Some(bounds(&still)));
+            let still = self.floats(out, &still, Some(Bounds::of(&still)));
             vec![json!({ "POSITION": still }); self.home.targets]
         } else {
             Vec::new()
         };
         let mut primitive = Map::new();
         primitive.insert("attributes".into(), Value::Object(attributes));
-        primitive.insert("indices".into(), self.indices(out, false));
+        primitive.insert("indices".into(), self.indices(out, PatchSide::Front));
         if let Some(material) = material {
             primitive.insert("material".into(), json!(material));
         }
@@ -310,34 +227,48 @@ impl<'s> Patch<'s> {
         if !targets.is_empty() {
             primitive.insert("targets".into(), Value::Array(targets));
         }
-        primitive.insert("extras".into(), json!({ "darn": addition.extras }));
+        primitive.insert("extras".into(), json!({ "darn": patch.extras }));
         Value::Object(primitive)
     }
 
-    /// A primitive with its other side out: it shares all but normals and indices.
+    /// The primitive of the patch's back: it shares all accessors of the front except normals and indices.
     fn back(&self, out: &mut Appender<'_>, front: &Value) -> Value {
         let mut back = front.clone();
-        back["indices"] = self.indices(out, true);
+        back["indices"] = self.indices(out, PatchSide::Back);
         if self.look.normals.is_some() {
             let inward: Vec<[f32; 3]> = self.normals().iter().map(|n| n.map(|x| -x)).collect();
-            back["attributes"]["NORMAL"] = out.accessor(Content {
-                name: &self.addition.name,
-                target: Target::Vertices,
-                component: ComponentType::F32,
-                kind: Type::Vec3,
-                bytes: bytes_of(&inward),
-                bounds: None,
-            });
+            back["attributes"]["NORMAL"] = self.floats(out, &inward, None);
         }
         back
     }
 
-    /// Appends the joints of one set.
+    /// Appends an accessor of VEC`N` over the vertices; returns its index.
+    fn floats<const N: usize>(
+        &self,
+        out: &mut Appender<'_>,
+        rows: &[[f32; N]],
+        bounds: Option<Bounds>,
+    ) -> Value {
+        out.accessor(AccessorData {
+            name: &self.patch.name,
+            target: BufferTarget::Vertices,
+            component: ComponentType::F32,
+            kind: match N {
+                2 => Type::Vec2,
+                3 => Type::Vec3,
+                _ => Type::Vec4,
+            },
+            bytes: float_bytes(rows),
+            bounds,
+        })
+    }
+
+    /// Appends the joints of one set; returns the accessor's index.
     fn joints(&self, out: &mut Appender<'_>, set: &[Influence]) -> Value {
         let joints = set.iter().flat_map(|influence| influence.joints);
-        out.accessor(Content {
-            name: &self.addition.name,
-            target: Target::Vertices,
+        out.accessor(AccessorData {
+            name: &self.patch.name,
+            target: BufferTarget::Vertices,
             component: ComponentType::U16,
             kind: Type::Vec4,
             bytes: joints.flat_map(u16::to_le_bytes).collect(),
@@ -345,17 +276,17 @@ impl<'s> Patch<'s> {
         })
     }
 
-    /// Normals in the node's space, unit: the transpose of its linear part undoes the inverse transpose that renderers apply.
-    /// At the scan's own vertices they are the scan's own, so that light does not break where patch and scan meet.
+    /// Unit normals in the node's space: the transpose of its linear part, since renderers apply the inverse transpose.
+    /// The scan's own vertices keep their stored normals, so that the shading has no seam between patch and scan.
     fn normals(&self) -> Vec<[f32; 3]> {
-        let back = self.home.placement.linear.transpose();
+        let to_node = self.home.transform.linear.transpose();
         let unit = |normal: &Vec3| {
-            (back * normal)
+            (to_node * normal)
                 .try_normalize(f64::MIN_POSITIVE)
                 .unwrap_or_else(Vec3::z)
         };
-        (self.addition.points.iter())
-            .zip(&self.addition.normals)
+        (self.patch.points.iter())
+            .zip(&self.patch.normals)
             .map(|(point, normal)| {
                 self.stored_normal(point)
                     .unwrap_or_else(|| unit(normal).map(|x| x as f32).into())
@@ -363,7 +294,7 @@ impl<'s> Patch<'s> {
             .collect()
     }
 
-    /// The scan's normal at a patch point that is one of the look's own vertices, if it is one (of unit length).
+    /// The scan's normal at a patch point that is a vertex of `look`, if it has unit length.
     fn stored_normal(&self, point: &PatchPoint) -> Option<[f32; 3]> {
         let PatchPoint::Scan(vertex) = *point else {
             return None;
@@ -374,15 +305,16 @@ impl<'s> Patch<'s> {
         (self.look.node == self.home.node && unit).then_some(stored)
     }
 
-    /// Appends the triangles, turned round where the node's transform will turn them again, and for the back.
-    fn indices(&self, out: &mut Appender<'_>, back: bool) -> Value {
-        let turned = self.home.placement.mirrors() != back;
+    /// Appends the triangles of one side; returns the accessor's index. Their winding is reversed on the back, and
+    /// reversed if the node's transform mirrors.
+    fn indices(&self, out: &mut Appender<'_>, side: PatchSide) -> Value {
+        let reversed = self.home.transform.mirrors() != (side == PatchSide::Back);
         let faces = self
-            .addition
+            .patch
             .faces
             .iter()
-            .map(|&[a, b, c]| if turned { [a, c, b] } else { [a, b, c] });
-        // 65535 is not an index but a restart in u16.
+            .map(|&[a, b, c]| if reversed { [a, c, b] } else { [a, b, c] });
+        // In u16, 65535 is not an index: it restarts a primitive.
         let (component, bytes) = if self.points.len() <= usize::from(u16::MAX) {
             (
                 ComponentType::U16,
@@ -397,16 +329,51 @@ impl<'s> Patch<'s> {
                 faces.flatten().flat_map(u32::to_le_bytes).collect(),
             )
         };
-        let (name, target, kind) = (self.addition.name.as_str(), Target::Indices, Type::Scalar);
-        out.accessor(Content {
-            name,
-            target,
+        out.accessor(AccessorData {
+            name: &self.patch.name,
+            target: BufferTarget::Indices,
             component,
-            kind,
+            kind: Type::Scalar,
             bytes,
             bounds: None,
         })
     }
+}
+
+/// Checks that a patch has faces over its points, and finite attributes, as many as the part whose look it takes.
+fn check_values(patch: &PatchPrimitive, look: &ScanPart) -> Result<(), String> {
+    let n = patch.points.len();
+    if patch.faces.is_empty() || u32::try_from(n).is_err() {
+        return Err(format!("{} faces over {n} points", patch.faces.len()));
+    }
+    let outside = |face: &&[u32; 3]| face.iter().any(|v| *v as usize >= n);
+    if let Some(face) = patch.faces.iter().find(outside) {
+        return Err(format!("face {face:?} goes past the {n} points"));
+    }
+    if look.normals.is_some() {
+        expect_count(patch.normals.len(), n, "normals")?;
+    }
+    let sets = patch.texcoords.len();
+    expect_count(sets, look.texcoords.len(), "texture coordinate sets")?;
+    expect_count(patch.colors.len(), look.colors.len(), "colour sets")?;
+    for set in &patch.texcoords {
+        expect_count(set.len(), n, "texture coordinates")?;
+    }
+    for set in &patch.colors {
+        expect_count(set.len(), n, "colours")?;
+    }
+    let mut texcoords = patch.texcoords.iter().flatten().flatten();
+    let mut colors = patch.colors.iter().flatten().flatten();
+    if !(texcoords.all(|x| x.is_finite()) && colors.all(|x| x.is_finite())) {
+        return Err("a texture coordinate or colour is not finite".into());
+    }
+    Ok(())
+}
+
+/// The stored position of a vertex of the surface that belongs to the home's node; such positions are finite.
+fn stored_on(scan: &Scan, home: &ScanPart, vertex: u32) -> Option<[f32; 3]> {
+    let (node, local) = scan.stored_position(vertex)?;
+    (node == home.node).then_some(local)
 }
 
 fn expect_count(found: usize, wanted: usize, what: &str) -> Result<(), String> {
@@ -415,24 +382,4 @@ fn expect_count(found: usize, wanted: usize, what: &str) -> Result<(), String> {
     } else {
         Err(format!("{found} {what}, where {wanted} are wanted"))
     }
-}
-
-fn bytes_of<const N: usize>(values: &[[f32; N]]) -> Vec<u8> {
-    values
-        .iter()
-        .flatten()
-        .flat_map(|x| x.to_le_bytes())
-        .collect()
-}
-
-fn bounds(points: &[[f32; 3]]) -> [[f32; 3]; 2] {
-    let mut out = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
-    let [min, max] = &mut out;
-    for point in points {
-        for ((min, max), x) in min.iter_mut().zip(max.iter_mut()).zip(point) {
-            *min = min.min(*x);
-            *max = max.max(*x);
-        }
-    }
-    out
 }

@@ -1,23 +1,23 @@
-//! What writing patches must hold to. The `gltf` crate reads the results back as an independent witness.
+//! Laws of writing patches. The `gltf` crate reads the results back as an independent check.
 
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
 use super::skin::Influence;
 use super::testing::Builder;
-use super::{Addition, PatchPoint, Scan, ScanError, ScanLimits};
+use super::{PatchPoint, PatchPrimitive, Scan, ScanError, ScanLimits};
 use darn_geometry::mesh::Vec3;
 
 fn read(bytes: &[u8]) -> Scan {
-    Scan::read(bytes, &ScanLimits::default()).unwrap()
+    Scan::read(bytes.to_vec(), &ScanLimits::default()).unwrap()
 }
 
 /// A tent over the first three vertices of a part: one new point, three triangles.
-fn tent(scan: &Scan, part: usize, top: Vec3) -> Addition {
+fn tent(scan: &Scan, part: usize, top: Vec3) -> PatchPrimitive {
     let look = &scan.parts[part];
     let first = look.vertices.start;
     let rim = (first..first + 3).map(PatchPoint::Scan);
-    Addition {
+    PatchPrimitive {
         part,
         material_of: part,
         points: rim.chain([PatchPoint::New(top)]).collect(),
@@ -31,22 +31,24 @@ fn tent(scan: &Scan, part: usize, top: Vec3) -> Addition {
     }
 }
 
-/// Asserts that everything in `old` is in `new`, in the same place and spelling; lists may have grown, `free` may differ.
-fn kept(old: &Value, new: &Value, at: &str, free: &[&str]) {
+/// Asserts that everything in `old` is in `new`, in the same place and spelling. Lists may have grown; the places in
+/// `free` may differ.
+fn assert_kept(old: &Value, new: &Value, at: &str, free: &[&str]) {
     match (old, new) {
         _ if free.contains(&at) => {}
         (Value::Object(old), Value::Object(new)) => {
             let keys: Vec<_> = new.keys().take(old.len()).collect();
             assert_eq!(keys, old.keys().collect::<Vec<_>>(), "{at}");
-            old.iter()
-                .for_each(|(key, value)| kept(value, &new[key], &format!("{at}/{key}"), free));
+            old.iter().for_each(|(key, value)| {
+                assert_kept(value, &new[key], &format!("{at}/{key}"), free)
+            });
         }
         (Value::Array(old), Value::Array(new)) => {
             assert!(new.len() >= old.len(), "{at}");
             old.iter()
                 .zip(new)
                 .enumerate()
-                .for_each(|(i, (old, new))| kept(old, new, &format!("{at}/{i}"), free));
+                .for_each(|(i, (old, new))| assert_kept(old, new, &format!("{at}/{i}"), free));
         }
         _ => assert_eq!(old.to_string(), new.to_string(), "{at}"),
     }
@@ -61,8 +63,8 @@ fn parsed(bytes: &[u8]) -> (Value, Vec<u8>) {
     (serde_json::from_slice(&bytes[layout.json]).unwrap(), bin)
 }
 
-/// Positions and triangles of the last primitive of the first mesh, found through the `gltf` crate.
-fn witness(bytes: &[u8]) -> (Vec<[f32; 3]>, Vec<u16>) {
+/// Positions and triangles of the last primitive of the first mesh, as the `gltf` crate reads them.
+fn read_by_gltf(bytes: &[u8]) -> (Vec<[f32; 3]>, Vec<u16>) {
     let gltf::Gltf { document, blob } = gltf::Gltf::from_slice(bytes).unwrap();
     let blob = blob.unwrap();
     let primitive = document
@@ -93,14 +95,14 @@ fn witness(bytes: &[u8]) -> (Vec<[f32; 3]>, Vec<u16>) {
 }
 
 #[test]
-fn without_additions_the_bytes_come_back() {
+fn without_patches_the_bytes_come_back() {
     for bytes in [Builder::square().glb(), Builder::square().gltf()] {
         assert_eq!(read(&bytes).write(&[]).unwrap(), bytes);
     }
 }
 
 #[test]
-fn everything_that_was_there_stays() {
+fn everything_in_the_scan_stays() {
     let mut scan = Builder::square();
     scan.json["asset"]["extensions"] = json!({"X_museum": {"a": null}});
     scan.json["nodes"][0]["extras"] = Value::Null;
@@ -120,7 +122,7 @@ fn everything_that_was_there_stays() {
         .write(&[tent(&scan, 0, Vec3::new(0.5, 0.5, 1.0))])
         .unwrap();
     let ((old, old_bin), (new, new_bin)) = (parsed(&bytes), parsed(&out));
-    kept(&old, &new, "", &["/buffers/0/byteLength"]);
+    assert_kept(&old, &new, "", &["/buffers/0/byteLength"]);
     assert!(
         String::from_utf8_lossy(&out).contains(odd),
         "not a character of what was there changes"
@@ -155,8 +157,8 @@ fn a_patch_reads_back_where_it_was_put() {
     scan.json["meshes"][0]["primitives"][0]["attributes"] = attributes;
     let scan = read(&scan.glb());
     let top = Vec3::new(10.7, 0.3, -2.2);
-    let addition = tent(&scan, 0, top);
-    let out = scan.write(std::slice::from_ref(&addition)).unwrap();
+    let tent = tent(&scan, 0, top);
+    let out = scan.write(std::slice::from_ref(&tent)).unwrap();
     let again = read(&out);
     let patch = &again.parts[1];
     let at = |vertex: u32| again.surface.positions[(patch.vertices.start + vertex) as usize];
@@ -169,14 +171,14 @@ fn a_patch_reads_back_where_it_was_put() {
     }
     assert!((at(3) - top).norm() < 1e-6);
     let faces = &again.surface.faces[patch.faces.start as usize..];
-    for (face, wanted) in faces.iter().zip(&addition.faces) {
+    for (face, wanted) in faces.iter().zip(&tent.faces) {
         let mut face = face.map(|v| v - patch.vertices.start);
         while face[0] != wanted[0] {
             face.rotate_left(1);
         }
         assert_eq!(
             &face, wanted,
-            "counter-clockwise in the scene, mirrored or not"
+            "counter-clockwise in the scene, even if the node mirrors"
         );
     }
     assert_eq!(&*patch.texcoords[0], &[[0.25, 0.5]; 4]);
@@ -186,13 +188,13 @@ fn a_patch_reads_back_where_it_was_put() {
         "VEC3 like its neighbour"
     );
     assert!(patch.normals.is_some());
-    let (positions, indices) = witness(&out);
+    let (positions, indices) = read_by_gltf(&out);
     assert_eq!((positions.len(), indices.len()), (4, 9));
     assert_eq!(positions[1], [1.0, 0.0, 0.0]);
 }
 
 #[test]
-fn new_bytes_go_where_the_container_wants_them() {
+fn new_bytes_go_to_the_bin_chunk_or_to_a_data_uri() {
     // JSON: a data URI of its own.
     let scan = read(&Builder::square().gltf());
     let (json, _) = parsed(&scan.write(&[tent(&scan, 0, Vec3::z())]).unwrap());
@@ -219,7 +221,7 @@ fn new_bytes_go_where_the_container_wants_them() {
 }
 
 #[test]
-fn morph_targets_are_as_many_and_do_not_move_the_patch() {
+fn a_patch_has_the_mesh_s_morph_targets_and_none_moves_it() {
     let mut scan = Builder::square();
     scan.json["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": 0}, {"POSITION": 0}]);
     let scan = read(&scan.glb());
@@ -243,7 +245,7 @@ fn sets(bytes: &[u8]) -> Vec<Vec<Influence>> {
 }
 
 #[test]
-fn a_patch_on_a_skinned_mesh_is_moved_as_the_rim_beside_it() {
+fn a_patch_on_a_skinned_mesh_has_the_joints_of_its_rim() {
     let bytes = Builder::skinned().glb();
     let scan = read(&bytes);
     // Nearest to the corner (1, 0, 0), where the skin's positions are.
@@ -267,10 +269,10 @@ fn a_patch_on_a_skinned_mesh_is_moved_as_the_rim_beside_it() {
         assert_eq!((accessor.count(), accessor.data_type()), (4, component));
         assert_eq!(accessor.dimensions(), gltf::accessor::Dimensions::Vec4);
     }
-    let (positions, _) = witness(&out);
+    let (positions, _) = read_by_gltf(&out);
     assert_eq!(positions[3], [0.9, 0.2, 0.125], "in the mesh's own space");
     let ((old, old_bin), (new, new_bin)) = (parsed(&bytes), parsed(&out));
-    kept(&old, &new, "", &["/buffers/0/byteLength"]);
+    assert_kept(&old, &new, "", &["/buffers/0/byteLength"]);
     assert_eq!(&new_bin[..old_bin.len()], &old_bin);
 }
 
@@ -316,7 +318,7 @@ fn weights_of_a_patch_sum_to_one_over_all_sets() {
 }
 
 #[test]
-fn a_mesh_that_any_node_skins_gets_patches_with_joints_and_others_do_not() {
+fn only_patches_of_skinned_meshes_have_joints() {
     let mut scan = Builder::square();
     scan.json["nodes"] = json!([{"mesh": 0}, {"mesh": 0, "skin": 0}, {}]);
     scan.json["skins"] = json!([{"joints": [2]}]);
@@ -338,7 +340,7 @@ fn a_mesh_that_any_node_skins_gets_patches_with_joints_and_others_do_not() {
 }
 
 #[test]
-fn one_copy_of_a_material_serves_all_patches_and_the_next_mending() {
+fn all_patches_and_later_mends_share_one_copy_of_a_material() {
     let scan = read(&Builder::square().glb());
     let out = scan
         .write(&[tent(&scan, 0, Vec3::z()), tent(&scan, 0, -Vec3::z())])
@@ -346,7 +348,7 @@ fn one_copy_of_a_material_serves_all_patches_and_the_next_mending() {
     let again = read(&out);
     let out = again.write(&[tent(&again, 1, Vec3::z())]).unwrap();
     assert_eq!(parsed(&out).0["materials"].as_array().unwrap().len(), 2);
-    // Extras that are no object stay; without a material there is none.
+    // Extras that are not an object stay.
     let mut scan = Builder::square();
     scan.json["materials"][0]["extras"] = json!("loan 7");
     let scan = read(&scan.glb());
@@ -359,35 +361,35 @@ fn a_patch_that_contradicts_itself_is_refused() {
     let scan = read(&Builder::square().glb());
     let good = tent(&scan, 0, Vec3::z());
     let bad = [
-        Addition {
+        PatchPrimitive {
             part: 7,
             ..good.clone()
         },
-        Addition {
+        PatchPrimitive {
             faces: vec![],
             ..good.clone()
         },
-        Addition {
+        PatchPrimitive {
             faces: vec![[0, 1, 4]],
             ..good.clone()
         },
-        Addition {
+        PatchPrimitive {
             texcoords: vec![vec![]],
             ..good.clone()
         },
-        Addition {
+        PatchPrimitive {
             points: vec![PatchPoint::Scan(99); 4],
             ..good.clone()
         },
-        Addition {
+        PatchPrimitive {
             points: vec![PatchPoint::New(Vec3::repeat(1e300)); 4],
             ..good.clone()
         },
     ];
-    for addition in bad {
+    for patch in bad {
         assert!(matches!(
-            scan.write(&[good.clone(), addition]),
-            Err(ScanError::Addition { addition: 1, .. })
+            scan.write(&[good.clone(), patch]),
+            Err(ScanError::InvalidPatch { patch: 1, .. })
         ));
     }
     let mut flat = Builder::square();
@@ -412,7 +414,7 @@ proptest! {
         scan.json["nodes"][0] = json!({"mesh": 0, "translation": translation, "scale": scale});
         let scan = read(&scan.glb());
         let out = scan.write(&[tent(&scan, 0, Vec3::z())]).unwrap();
-        let (positions, _) = witness(&out);
+        let (positions, _) = read_by_gltf(&out);
         for (old, new) in corners.iter().zip(&positions).take(3) {
             prop_assert_eq!(old.map(f32::to_bits), new.map(f32::to_bits));
         }

@@ -1,37 +1,48 @@
-//! JSON text to a value in which every key is a key.
+//! Parses JSON text to a [`Value`] in which every key is an ordinary key.
 //!
-//! serde_json's own reader of values takes an object that begins with its private key for a raw value (a feature that `gltf` turns on)
-//! for a *text* to be parsed anew: with a depth of its own, so that a nest of such texts overflows the stack, and past every count of
-//! what the text holds.
+//! `gltf` turns on serde_json's feature `raw_value`. With it, serde_json's own parser treats an object that begins with a private key as a
+//! string of JSON to be parsed again, with a fresh recursion limit: nested strings of that kind overflow the stack, and escape any count
+//! of what the text contains. This parser reads that key as text.
 
 use std::fmt;
 
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Number, Value};
 
-/// The private key under which serde_json hands out a number as it is spelled (`arbitrary_precision`), but for integers. An object that somebody wrote
-/// with it is read as that number, which costs and harms nothing.
-const SPELLED: &str = "$serde_json::private::Number";
+/// The private key under which serde_json's feature `arbitrary_precision` hands out a number that is not a machine integer, as its text.
+/// An object that a caller wrote with this key is read as that number, which is harmless.
+const NUMBER_KEY: &str = "$serde_json::private::Number";
 
-/// Reads a text; arrays and objects may lie in each other 127 deep, as serde_json has it.
+/// Parses a text. Arrays and objects may be nested 127 deep, the limit of serde_json.
 ///
 /// # Errors
-/// When it is not JSON, or deeper than that.
+/// The text is not JSON, or is nested deeper.
+///
+/// # Examples
+/// ```
+/// let value = darn_json::value(br#"{"holes": [{"id": 2}]}"#)?;
+/// assert_eq!(value["holes"][0]["id"], 2);
+///
+/// let raw = darn_json::value(br#"{"$serde_json::private::RawValue": "[0]"}"#)?;
+/// assert!(raw.is_object(), "the text of the private key is not parsed");
+/// # Ok::<(), serde_json::Error>(())
+/// ```
 pub fn value(text: &[u8]) -> Result<Value, serde_json::Error> {
-    serde_json::from_slice(text).map(|Plain(value)| value)
+    serde_json::from_slice(text).map(|PlainValue(value)| value)
 }
 
-struct Plain(Value);
+/// A value read by [`ValueVisitor`], at any depth.
+struct PlainValue(Value);
 
-impl<'de> Deserialize<'de> for Plain {
+impl<'de> Deserialize<'de> for PlainValue {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(Building).map(Plain)
+        deserializer.deserialize_any(ValueVisitor).map(PlainValue)
     }
 }
 
-struct Building;
+struct ValueVisitor;
 
-impl<'de> Visitor<'de> for Building {
+impl<'de> Visitor<'de> for ValueVisitor {
     type Value = Value;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -60,7 +71,7 @@ impl<'de> Visitor<'de> for Building {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Value, A::Error> {
         let mut array = Vec::new();
-        while let Some(Plain(item)) = items.next_element()? {
+        while let Some(PlainValue(item)) = items.next_element()? {
             array.push(item);
         }
         Ok(Value::Array(array))
@@ -69,12 +80,12 @@ impl<'de> Visitor<'de> for Building {
     fn visit_map<A: MapAccess<'de>>(self, mut members: A) -> Result<Value, A::Error> {
         let mut object = Map::new();
         while let Some(key) = members.next_key::<String>()? {
-            if object.is_empty() && key == SPELLED {
-                let spelled: String = members.next_value()?;
-                let number: Number = spelled.parse().map_err(A::Error::custom)?;
+            if object.is_empty() && key == NUMBER_KEY {
+                let number_text: String = members.next_value()?;
+                let number: Number = number_text.parse().map_err(A::Error::custom)?;
                 return Ok(Value::Number(number));
             }
-            let Plain(value) = members.next_value()?;
+            let PlainValue(value) = members.next_value()?;
             object.insert(key, value);
         }
         Ok(Value::Object(object))
@@ -86,23 +97,23 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const RAW: &str = "$serde_json::private::RawValue";
+    const RAW_VALUE_KEY: &str = "$serde_json::private::RawValue";
 
     #[test]
-    fn a_private_key_is_a_key() {
-        let text = format!(r#"{{"{RAW}": "[0, 0]"}}"#);
+    fn the_raw_value_key_is_an_ordinary_key() {
+        let text = format!(r#"{{"{RAW_VALUE_KEY}": "[0, 0]"}}"#);
         let read = value(text.as_bytes()).unwrap();
-        assert_eq!(read[RAW], "[0, 0]");
+        assert_eq!(read[RAW_VALUE_KEY], "[0, 0]");
     }
 
     #[test]
-    fn no_nest_is_too_deep_for_the_stack() {
-        // Each text lies as a string in the next; without quotation marks in need of more and more backslashes.
+    fn nested_strings_of_json_do_not_overflow_the_stack() {
+        // Each text is a string inside the next; `\u` escapes keep the length from doubling at each level.
         let mut text = "0".to_owned();
         for _ in 0..60 {
             let inner = text.replace('\\', "\\u005c").replace('"', "\\u0022");
             text = format!(
-                "{}{{\"{RAW}\":\"{inner}\"}}{}",
+                "{}{{\"{RAW_VALUE_KEY}\":\"{inner}\"}}{}",
                 "[".repeat(100),
                 "]".repeat(100)
             );
@@ -117,13 +128,13 @@ mod tests {
         );
     }
 
-    /// Any value, numbers spelled in any way.
+    /// The text of any JSON value, with numbers in many notations.
     fn any_json() -> impl Strategy<Value = String> {
         let leaf = prop_oneof![
             Just("null".to_owned()),
             Just("true".to_owned()),
             any::<f64>()
-                .prop_filter("JSON has no others", |x| x.is_finite())
+                .prop_filter("JSON has finite numbers only", |x| x.is_finite())
                 .prop_map(|x| format!("{x:e}")),
             any::<i64>().prop_map(|x| x.to_string()),
             "[0-9]{30}".prop_map(|x| format!("1{x}.0E+5")),
@@ -144,7 +155,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn all_else_is_read_as_serde_json_reads_it(text in any_json()) {
+        fn any_other_json_is_read_as_serde_json_reads_it(text in any_json()) {
             let theirs: Value = serde_json::from_str(&text).unwrap();
             prop_assert_eq!(value(text.as_bytes()).unwrap(), theirs);
         }

@@ -1,8 +1,12 @@
-//! Where the weights come from: the network as defined in burn, simulated sheets of cloth, training, and evaluation.
+//! The network in burn, simulated sheets of cloth, training and evaluation: where the weights come from.
 //!
-//! [`scarffolds`] simulates draped squares and draws samples from them; [`unet`] is the paper's attention U-Net in burn, the definition that
-//! the engine of `darn-net` is tested against; [`train`] trains it; [`evaluate`] measures fills on sheets with a known answer. This is the
-//! only crate that knows burn; no request reaches it but through [`unet::load_network`].
+//! [`scarffolds`] simulates draped squares and draws samples from them. [`unet`] is the paper's attention U-Net in burn, the definition that
+//! the engine of `darn-net` is tested against. [`train`] trains it. [`evaluate`] measures fills on sheets whose truth is known. This is the only
+//! crate that depends on burn; requests use [`unet::load_network`] only.
+#![warn(missing_docs)]
+
+mod cell_normals;
+mod line_chart;
 
 pub mod evaluate;
 pub mod scarffolds;

@@ -12,7 +12,7 @@ pub fn apart(holes: &mut [Filled]) {
         let own = &mut rest[0];
         let others = near(own, before);
         if !others.faces.is_empty() {
-            own.prepared.plan.keep_off(&mut own.patch, &others);
+            own.prepared.plan.separate(&mut own.patch, &others);
         }
     }
 }
@@ -49,7 +49,7 @@ fn rim<'a>(filled: &'a Filled) -> impl Iterator<Item = u32> + 'a {
         .patch
         .rim
         .iter()
-        .map(|v| region.vertices[*v as usize])
+        .map(|v| region.vertices[*v as usize].0)
 }
 
 fn bounds(positions: &[Vec3]) -> (Vec3, Vec3) {

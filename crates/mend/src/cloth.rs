@@ -4,15 +4,16 @@ use std::time::Instant;
 
 use super::milliseconds;
 use darn_contract::v1;
+use darn_geometry::mesh::index::{FaceId, VertexId};
 use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind, boundary_loops};
 use darn_geometry::mesh::topology::Topology;
-use darn_geometry::mesh::weld::{Welded, weld};
+use darn_geometry::mesh::weld::{WeldedMesh, weld};
 use darn_gltf_scan::Scan;
 
 /// The welded surface of a scan and its loops.
 pub struct Cloth {
-    /// Welded mesh; its faces lead back to the scan's by `face_of`.
-    pub welded: Welded,
+    /// Welded mesh; its faces lead back to the scan's by `soup_face`.
+    pub welded: WeldedMesh,
     /// Its topology.
     pub topology: Topology,
     /// Its boundary loops; a loop's id is its place here.
@@ -52,8 +53,8 @@ impl Cloth {
     }
 
     /// The scan's part that a welded face belongs to, and its corners there.
-    pub fn source(&self, scan: &Scan, face: u32) -> Option<(usize, [u32; 3])> {
-        let own = *self.welded.face_of.get(face as usize)?;
+    pub fn source(&self, scan: &Scan, face: FaceId) -> Option<(usize, [u32; 3])> {
+        let own = *self.welded.soup_face.get(face.index())?;
         Some((
             scan.part_of_face(own)?,
             *scan.surface.faces.get(own as usize)?,
@@ -65,10 +66,10 @@ impl Cloth {
         let part = rim
             .half_edges
             .first()
-            .and_then(|h| self.source(scan, h / 3))
+            .and_then(|h| self.source(scan, h.face()))
             .map(|(part, _)| part);
         v1::Loop {
-            id: rim.id,
+            id: rim.id.0,
             kind: kind(rim.kind) as i32,
             length: rim.length,
             vertices: rim.vertices.len() as u32,
@@ -86,7 +87,7 @@ impl Cloth {
     /// Whether the meshes a loop lies on are drawn here for the first time, all along it: a patch on a mesh shows at every node that
     /// draws it.
     pub fn on_first_instance(&self, scan: &Scan, rim: &BoundaryLoop) -> bool {
-        let mut parts = rim.half_edges.iter().map(|h| self.source(scan, h / 3));
+        let mut parts = rim.half_edges.iter().map(|h| self.source(scan, h.face()));
         parts.all(|part| part.is_none_or(|(part, _)| scan.parts[part].first_instance))
     }
 
@@ -129,7 +130,7 @@ impl Cloth {
 
     /// Places where boundary loops touch in a point (bow-ties).
     fn touching(&self) -> usize {
-        let place = |v: &u32| self.welded.mesh.positions[*v as usize];
+        let place = |v: &VertexId| self.welded.mesh.positions[v.index()];
         let ends = self.loops.iter().flat_map(|l| &l.vertices).map(place);
         let mut places: Vec<[u64; 3]> = ends.map(|p| [p.x, p.y, p.z].map(f64::to_bits)).collect();
         places.sort_unstable();

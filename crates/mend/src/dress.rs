@@ -12,9 +12,9 @@ use darn_contract::v1;
 use darn_geometry::mesh::Vec3;
 use darn_geometry::mesh::curvature::vertex_normals;
 use darn_geometry::mesh::region::Region;
-use darn_geometry::patch::attributes::{Columns, dress};
+use darn_geometry::patch::attributes::{Columns, extend_attributes};
 use darn_geometry::patch::{Patch, quality};
-use darn_gltf_scan::{Addition, Part, PatchPoint, Scan};
+use darn_gltf_scan::{PatchPoint, PatchPrimitive, Scan, ScanPart};
 use darn_net::WeightsCard;
 
 /// The patch as a primitive of the part that most of its rim belongs to.
@@ -23,7 +23,7 @@ pub fn addition(
     prepared: &Prepared,
     Made { patch, report }: &Made,
     card: &WeightsCard,
-) -> Result<Addition, MendError> {
+) -> Result<PatchPrimitive, MendError> {
     let (region, chart) = (&prepared.region, &prepared.chart);
     let sources: Vec<Option<(usize, [u32; 3])>> = region
         .faces
@@ -33,7 +33,7 @@ pub fn addition(
     let part = majority(patch, region, &sources);
     let look = &scan.parts[part];
     let alike = |other: usize| {
-        let other: &Part = &scan.parts[other];
+        let other: &ScanPart = &scan.parts[other];
         other.material == look.material
             && other.texcoords.len() == look.texcoords.len()
             && other.colors.len() == look.colors.len()
@@ -74,7 +74,7 @@ pub fn addition(
         width,
     };
     let (dressed, normals) = rayon::join(
-        || dress((&prepared.plan, patch), region, chart, &columns),
+        || extend_attributes(&prepared.plan, patch, region, chart, &columns),
         || normals(patch, region),
     );
     let points = dressed.corners.iter().map(|c| match c.scan {
@@ -105,7 +105,7 @@ pub fn addition(
             .map(|n| [0, 1, 2, 3].map(|k: usize| rgba[k][n]))
             .collect()
     });
-    Ok(Addition {
+    Ok(PatchPrimitive {
         part,
         material_of: part,
         points: points.collect(),
@@ -126,7 +126,7 @@ pub fn addition(
 /// Whether most of a region shows its other side by triangles of its own.
 fn is_backed(region: &Region, cloth: &Cloth) -> bool {
     let backed = region.faces.iter();
-    let backed = backed.filter(|f| cloth.welded.backed[**f as usize]).count();
+    let backed = backed.filter(|f| cloth.welded.two_sided[f.index()]).count();
     2 * backed > region.faces.len()
 }
 
@@ -148,7 +148,7 @@ fn majority(patch: &Patch, region: &Region, sources: &[Option<(usize, [u32; 3])>
 }
 
 /// Texture coordinates, then colours, of a scan vertex.
-fn columns_of(part: &Part, vertex: u32) -> Vec<f64> {
+fn columns_of(part: &ScanPart, vertex: u32) -> Vec<f64> {
     let at = (vertex - part.vertices.start) as usize;
     let texcoords = part.texcoords.iter().flat_map(|set| set[at]);
     let colors = part.colors.iter().flat_map(|set| set[at]);

@@ -1,6 +1,6 @@
 //! Why a scan could not be mended, and the stable word programs know each reason by.
 
-use darn_contract::{FieldError, v1};
+use darn_contract::{Code, FieldError, codes, v1};
 use darn_geometry::flatten::FlattenError;
 use darn_geometry::mesh::region::RegionError;
 use darn_geometry::patch::PatchError;
@@ -95,38 +95,33 @@ pub enum MendError {
 }
 
 impl MendError {
-    /// The stable word for programs.
-    pub fn code(&self) -> &'static str {
+    /// Its row in the table of error codes.
+    pub fn code(&self) -> Code {
         match self {
-            MendError::Constraints(_) => "constraints_do_not_fit",
-            MendError::OutOfReach(_) => "anchor_out_of_reach",
-            MendError::NoHoles { .. } => "no_holes",
-            MendError::TooManyHoles { .. } => "too_many_holes",
-            MendError::NonManifold { .. } => "non_manifold_rim",
+            MendError::Constraints(_) => codes::CONSTRAINTS_DO_NOT_FIT,
+            MendError::OutOfReach(_) => codes::ANCHOR_OUT_OF_REACH,
+            MendError::NoHoles { .. } => codes::NO_HOLES,
+            MendError::TooManyHoles { .. } => codes::TOO_MANY_HOLES,
+            MendError::NonManifold { .. } => codes::NON_MANIFOLD_RIM,
             MendError::Region {
                 source: RegionError::TooLarge { .. },
                 ..
-            } => "coordinates_too_large",
-            MendError::Region { .. } => "not_a_disk",
-            MendError::Flatten { .. } => "not_cloth_like",
-            MendError::TooLittleKnown { .. } => "too_little_known",
+            } => codes::COORDINATES_TOO_LARGE,
+            MendError::Region { .. } => codes::NOT_A_DISK,
+            MendError::Flatten { .. } => codes::NOT_CLOTH_LIKE,
+            MendError::TooLittleKnown { .. } => codes::TOO_LITTLE_KNOWN,
             MendError::Patch {
                 source: PatchError::RimCrosses,
                 ..
-            } => "rim_crosses_itself",
-            MendError::Patch { .. } => "patch_degenerate",
-            MendError::Scan(ScanError::Singular { .. }) => "singular_transform",
-            MendError::NoCells { .. } => "hole_too_narrow",
+            } => codes::RIM_CROSSES_ITSELF,
+            MendError::Patch { .. } => codes::PATCH_DEGENERATE,
+            MendError::Scan(ScanError::Singular { .. }) => codes::SINGULAR_TRANSFORM,
+            MendError::NoCells { .. } => codes::HOLE_TOO_NARROW,
             MendError::Net(_)
             | MendError::Scan(_)
             | MendError::Picture(_)
-            | MendError::Abandoned => "internal",
+            | MendError::Abandoned => codes::INTERNAL,
         }
-    }
-
-    /// Whether it is our own fault and no business of the caller's.
-    pub fn is_internal(&self) -> bool {
-        self.code() == "internal"
     }
 
     /// The constraints it is about.

@@ -12,6 +12,7 @@ use super::wishes::Wishes;
 use super::{MendError, MendLimits, fill, milliseconds};
 use darn_contract::v1;
 use darn_geometry::mesh::Vec3;
+use darn_geometry::mesh::index::VertexId;
 use darn_geometry::mesh::loops::LoopKind;
 use darn_geometry::patch::quality::{self, Quality};
 use darn_geometry::patch::{self, Patch, Pull};
@@ -91,7 +92,7 @@ fn drawn(
 ) -> Result<Patch, MendError> {
     let stretch = |patch: &Patch| quality::measure(patch, &prepared.region).stretch_max;
     let usual = stretch(&unedited.patch);
-    let most = patch::bearable(usual);
+    let most = patch::stretch_limit(usual);
     let mut share = 1.0;
     for _ in 0..TRIES {
         let each = unedited.filled.iter().zip(moved);
@@ -186,8 +187,8 @@ fn covered(prepared: &Prepared, patch: &Patch, cloth: &Cloth) -> Option<String> 
             .map(|p| <[f64; 3]>::from(*p))
             .collect(),
     );
-    let is_near = |v: &u32| {
-        let place = <[f64; 3]>::from(cloth.welded.mesh.positions[*v as usize]);
+    let is_near = |v: &VertexId| {
+        let place = <[f64; 3]>::from(cloth.welded.mesh.positions[v.index()]);
         let nearest = tree.nearest_neighbor(&place);
         nearest.is_some_and(|p| p.distance_2(&place) <= near * near)
     };

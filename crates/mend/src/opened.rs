@@ -13,7 +13,7 @@ use super::select::{Chosen, Selection, select};
 use super::{Call, MendError, NetworkMender, VERSION, dress, milliseconds, search};
 use darn_contract::port::Mended;
 use darn_contract::{Constraints, FieldError, Search, v1};
-use darn_gltf_scan::{Addition, Scan};
+use darn_gltf_scan::{PatchPrimitive, Scan};
 
 /// A scan's cloth with the holes that a request chose, ready to be filled.
 pub struct Opened {
@@ -180,7 +180,11 @@ impl Opened {
     ///
     /// # Errors
     /// None today; see [`dress::addition`].
-    pub fn additions(&self, scan: &Scan, patched: &Patched) -> Result<Vec<Addition>, MendError> {
+    pub fn additions(
+        &self,
+        scan: &Scan,
+        patched: &Patched,
+    ) -> Result<Vec<PatchPrimitive>, MendError> {
         let each = patched.holes.par_iter().map(|(prepared, made)| {
             dress::addition(
                 (scan, &self.cloth),

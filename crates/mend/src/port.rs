@@ -1,13 +1,11 @@
 //! The port's [`Mender`] on loaded networks: reads the scan, mends it, and sorts refusals by whose fault they are.
 
-use std::error::Error;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use darn_contract::port::{
-    Cancellation, Class, EditSession, Mended, Mender, PatchForm, Patches, Refusal,
-};
-use darn_contract::{Constraints, Search, v1};
+use bytes::Bytes;
+use darn_contract::port::{Cancellation, EditSession, Mended, Mender, PatchForm, Patches, Refusal};
+use darn_contract::{Constraints, Search, codes, error_chain, v1};
 use darn_gltf_scan::{Scan, ScanError};
 
 use super::{Call, MendError, NetworkMender, ScanSession, add_read_time};
@@ -23,7 +21,8 @@ impl SharedMender {
     /// A scan, and how long reading it took.
     fn scan(&self, bytes: &[u8]) -> Result<(Scan, Duration), Refusal> {
         let started = Instant::now();
-        let scan = Scan::read(bytes, &self.0.scan_limits).map_err(|error| of_scan(&error))?;
+        let scan =
+            Scan::read(bytes.to_vec(), &self.0.scan_limits).map_err(|error| of_scan(&error))?;
         Ok((scan, started.elapsed()))
     }
 
@@ -38,11 +37,11 @@ impl SharedMender {
 impl Mender for SharedMender {
     fn inpaint(
         &self,
-        scan: &[u8],
+        scan: Bytes,
         constraints: &Constraints,
         cancellation: Cancellation<'_>,
     ) -> Result<Mended, Refusal> {
-        let (scan, read) = self.scan(scan)?;
+        let (scan, read) = self.scan(&scan)?;
         let mut mended =
             super::mend(&scan, constraints, self.call(cancellation)).map_err(of_mend)?;
         add_read_time(&mut mended.report.timings, read);
@@ -51,21 +50,21 @@ impl Mender for SharedMender {
 
     fn optimize_anchor(
         &self,
-        scan: &[u8],
+        scan: Bytes,
         search: &Search,
         cancellation: Cancellation<'_>,
     ) -> Result<v1::AnchorFound, Refusal> {
-        let (scan, _) = self.scan(scan)?;
+        let (scan, _) = self.scan(&scan)?;
         super::optimize_anchor(&scan, search, self.call(cancellation)).map_err(of_mend)
     }
 
     fn mend_to_target(
         &self,
-        scan: &[u8],
+        scan: Bytes,
         search: &Search,
         cancellation: Cancellation<'_>,
     ) -> Result<Mended, Refusal> {
-        let (scan, read) = self.scan(scan)?;
+        let (scan, read) = self.scan(&scan)?;
         let mut mended =
             super::mend_to_target(&scan, search, self.call(cancellation)).map_err(of_mend)?;
         add_read_time(&mut mended.report.timings, read);
@@ -74,25 +73,29 @@ impl Mender for SharedMender {
 
     fn open(
         &self,
-        scan: &[u8],
+        scan: Bytes,
         constraints: &Constraints,
         cancellation: Cancellation<'_>,
     ) -> Result<Box<dyn EditSession>, Refusal> {
-        let (scan, _) = self.scan(scan)?;
+        let (scan, _) = self.scan(&scan)?;
         let session = ScanSession::open(scan, constraints, Arc::clone(&self.0), cancellation);
         Ok(Box::new(session.map_err(of_mend)?))
     }
 
-    fn find_holes(&self, scan: &[u8]) -> Result<v1::HolesReport, Refusal> {
-        let (scan, read) = self.scan(scan)?;
+    fn find_holes(&self, scan: Bytes) -> Result<v1::HolesReport, Refusal> {
+        let (scan, read) = self.scan(&scan)?;
         let mut found = super::find_holes(&scan);
         add_read_time(&mut found.timings, read);
         Ok(found)
     }
 
     fn warm_up(&self) -> Result<(), Refusal> {
-        self.inpaint(EXAMPLE, &Constraints::default(), Cancellation::NEVER)
-            .map(drop)
+        self.inpaint(
+            Bytes::from_static(EXAMPLE),
+            &Constraints::default(),
+            Cancellation::NEVER,
+        )
+        .map(drop)
     }
 }
 
@@ -142,52 +145,26 @@ impl EditSession for ScanSession {
     }
 }
 
-/// The bytes decide between "not a scan" and "a scan that cannot be mended".
 fn of_scan(error: &ScanError) -> Refusal {
-    let (class, code) = match error {
-        ScanError::Container { .. } => (Class::Malformed, "not_a_gltf"),
-        ScanError::Invalid { .. } => (Class::Malformed, "invalid_gltf"),
-        ScanError::IndexOutOfRange { .. } => (Class::Unprocessable, "index_out_of_range"),
-        ScanError::NotFinite { .. } => (Class::Unprocessable, "position_not_finite"),
-        ScanError::Unsupported { .. } => (Class::Unprocessable, "unsupported_extension"),
-        ScanError::External { .. } => (Class::Unprocessable, "external_data"),
-        ScanError::Limit { .. } => (Class::TooLarge, "scan_too_large"),
-        ScanError::NoTriangles => (Class::Unprocessable, "no_triangles"),
-        ScanError::Singular { .. } => (Class::Unprocessable, "singular_transform"),
-        ScanError::Addition { .. } => (Class::Internal, "internal"),
+    let code = match error {
+        ScanError::Container { .. } => codes::NOT_A_GLTF,
+        ScanError::Invalid { .. } => codes::INVALID_GLTF,
+        ScanError::IndexOutOfRange { .. } => codes::INDEX_OUT_OF_RANGE,
+        ScanError::NotFinite { .. } => codes::POSITION_NOT_FINITE,
+        ScanError::Unsupported { .. } => codes::UNSUPPORTED_EXTENSION,
+        ScanError::External { .. } => codes::EXTERNAL_DATA,
+        ScanError::Limit { .. } => codes::SCAN_TOO_LARGE,
+        ScanError::NoTriangles => codes::NO_TRIANGLES,
+        ScanError::Singular { .. } => codes::SINGULAR_TRANSFORM,
+        ScanError::InvalidPatch { .. } => codes::INTERNAL,
     };
-    Refusal {
-        class,
-        code,
-        detail: error.to_string(),
-        fields: Vec::new(),
-    }
+    Refusal::new(code, error.to_string())
 }
 
 fn of_mend(error: MendError) -> Refusal {
-    let class = if error.is_internal() {
-        Class::Internal
-    } else {
-        Class::Unprocessable
-    };
     Refusal {
-        class,
         code: error.code(),
-        detail: told(&error),
+        detail: error_chain(&error),
         fields: error.fields(),
     }
-}
-
-/// An error and its causes in one line.
-fn told(error: &dyn Error) -> String {
-    let mut text = error.to_string();
-    let mut next = error.source();
-    while let Some(cause) = next {
-        let more = cause.to_string();
-        if !text.contains(&more) {
-            text = format!("{text}: {more}");
-        }
-        next = cause.source();
-    }
-    text
 }

@@ -11,7 +11,8 @@ use crate::edit::{HoleCells, Reach};
 use darn_contract::v1;
 use darn_geometry::flatten::{self, Chart};
 use darn_geometry::grid::{self, CELLS, Grid, NormalGrid, Normalisation};
-use darn_geometry::mesh::denoise::denoised;
+use darn_geometry::mesh::denoise::denoise;
+use darn_geometry::mesh::index::LoopId;
 use darn_geometry::mesh::layers::layers_near;
 use darn_geometry::mesh::region::{self, Region};
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
@@ -218,7 +219,7 @@ type Smoothing<'a> = &'a dyn Fn(&TriMesh) -> Option<TriMesh>;
 fn without_noise<T>(attempt: impl Fn(Smoothing) -> Result<T, MendError>) -> Result<T, MendError> {
     let noisy = Cell::new(false);
     let smoothed = |mesh: &TriMesh| {
-        let smooth = denoised(mesh);
+        let smooth = denoise(mesh);
         noisy.set(noisy.get() || smooth.is_some());
         smooth
     };
@@ -272,7 +273,7 @@ impl Laid {
             &cloth.welded.mesh,
             &cloth.topology,
             &cloth.loops,
-            hole as usize,
+            LoopId(hole),
             reach,
         )
         .map_err(|source| MendError::Region { hole, source })?;
@@ -327,11 +328,11 @@ impl Laid {
             let others = layers_near(&cloth.welded.mesh, &self.region, beyond);
             let plan = patch::plan_in(&cloth.welded.mesh, seen, &self.chart, &limits.patch)
                 .and_then(|plan| match &self.smooth {
-                    Some(_) => plan.joining(&self.region.mesh.positions),
+                    Some(_) => plan.with_region_at(&self.region.mesh.positions),
                     None => Ok(plan),
                 })
                 .map_err(|source| MendError::Patch { hole: id, source })?;
-            Ok::<_, MendError>((plan.among(&others), milliseconds(started)))
+            Ok::<_, MendError>((plan.with_layers(&others), milliseconds(started)))
         };
         let (sampled, planned) = rayon::join(sample, plan);
         let (grid, normal, cells, base, raster) = sampled?;
@@ -397,7 +398,7 @@ fn extent_at_a_glance(cloth: &Cloth, id: u32) -> f64 {
         &cloth.welded.mesh,
         &cloth.topology,
         &cloth.loops,
-        id as usize,
+        LoopId(id),
         COLLAR * reach_for(round),
     );
     match collar.map(|collar| flatten::hole_extent(&collar)) {
@@ -427,12 +428,12 @@ fn inside(polygon: &[Vec2], p: Vec2) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use darn_geometry::mesh::shapes::{shaken, sheet};
+    use darn_geometry::mesh::shapes::{jitter, sheet};
 
     #[test]
     fn a_noisy_scan_is_the_last_resort() {
         let clean = sheet(30, |_, _| true, |u, v| Vec3::new(u, v, 0.0));
-        let noisy = shaken(&clean, 0.3 / 30.0, 7);
+        let noisy = jitter(&clean, 0.3 / 30.0, 7);
         let crosses = || MendError::Patch {
             hole: 1,
             source: PatchError::RimCrosses,

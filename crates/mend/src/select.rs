@@ -82,7 +82,7 @@ pub fn select(
         return Err(MendError::NonManifold { hole });
     }
     let skipped: Vec<v1::Skipped> = (cloth.loops.iter())
-        .filter(|l| !chosen.contains_key(&l.id))
+        .filter(|l| !chosen.contains_key(&l.id.0))
         .map(|l| skipped(scan, cloth, l))
         .collect();
     if chosen.is_empty() {
@@ -120,7 +120,7 @@ fn find(scan: &Scan, cloth: &Cloth, selector: &HoleSelector) -> Result<u32, Stri
 fn fillable(scan: &Scan, cloth: &Cloth, rim: &BoundaryLoop) -> Result<u32, String> {
     match reason_to_skip(scan, cloth, rim) {
         // An error of its own says so, with its own code.
-        Some(("non_manifold", _)) | None => Ok(rim.id),
+        Some(("non_manifold", _)) | None => Ok(rim.id.0),
         Some((_, reason)) => Err(format!("loop {} is never filled: it is {reason}", rim.id)),
     }
 }
@@ -166,7 +166,7 @@ fn skipped(scan: &Scan, cloth: &Cloth, rim: &BoundaryLoop) -> v1::Skipped {
     let not_selected = ("not_selected", "a hole that the request did not choose");
     let (code, reason) = reason_to_skip(scan, cloth, rim).unwrap_or(not_selected);
     v1::Skipped {
-        id: rim.id,
+        id: rim.id.0,
         kind: kind(rim.kind) as i32,
         code: code.to_owned(),
         reason: reason.to_owned(),

@@ -8,8 +8,8 @@ use super::{Call, MendError, NetworkMender, picture};
 use darn_contract::port::{Cancellation, Mended};
 use darn_contract::{Constraints, FieldError, Search, v1};
 use darn_geometry::mesh::{Vec2, Vec3};
-use darn_gltf_scan::export::{Fresh, meshes};
-use darn_gltf_scan::{Addition, PatchPoint, Scan};
+use darn_gltf_scan::export::{NewMesh, meshes};
+use darn_gltf_scan::{PatchPoint, PatchPrimitive, Scan};
 
 /// A scan with its holes laid flat.
 pub struct ScanSession {
@@ -214,7 +214,7 @@ fn hole_bytes(hole: &v1::SessionHole) -> usize {
 }
 
 /// Patches as meshes of their own, in scene space, with the scan's first texture coordinates carried on.
-fn glb(scan: &Scan, additions: &[Addition]) -> Result<Vec<u8>, MendError> {
+fn glb(scan: &Scan, additions: &[PatchPrimitive]) -> Result<Vec<u8>, MendError> {
     let place = |point: &PatchPoint| -> [f32; 3] {
         match point {
             PatchPoint::New(p) => p.cast::<f32>().into(),
@@ -235,8 +235,8 @@ fn glb(scan: &Scan, additions: &[Addition]) -> Result<Vec<u8>, MendError> {
                 .collect()
         })
         .collect();
-    let fresh: Vec<Fresh> = (additions.iter().zip(positions.iter().zip(&normals)))
-        .map(|(addition, (positions, normals))| Fresh {
+    let fresh: Vec<NewMesh> = (additions.iter().zip(positions.iter().zip(&normals)))
+        .map(|(addition, (positions, normals))| NewMesh {
             name: &addition.name,
             positions,
             normals,

@@ -114,7 +114,7 @@ impl<'a> Wishes<'a> {
         let pull = |p: &Wanted| Pull {
             at: self.prepared.chart.frame.point(p.uv),
             to: p.position,
-            hold: p.firmness,
+            firmness: p.firmness,
         };
         self.points.iter().map(pull).collect()
     }

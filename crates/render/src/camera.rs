@@ -1,17 +1,19 @@
-//! The camera: where it stands, which way is up, and how a point of the scene becomes a point of the picture.
+//! The camera: its position and axes, and the projection from the scene to the picture.
 
-use super::{Aim, Drawable, Framing, View};
+use super::face::DrawableFace;
+use super::options::{CameraDirection, Framing, PictureOptions, PixelSize};
 use darn_geometry::mesh::{TriMesh, Vec3};
 use nalgebra::Matrix3;
 
 /// Half the vertical field of view, radians: a mild perspective.
 const HALF_FOV: f64 = 0.21;
-/// Share of the picture's half side that the mesh may reach.
+/// How much of the picture's half side the mesh may fill.
 const MARGIN: f64 = 0.93;
-/// How far `Aim::Auto` stands off the cloth's normal, degrees: to the side, up, and the highest it goes.
-const ASIDE: f64 = 24.0;
-const LIFTED: f64 = 12.0;
-const HIGHEST: f64 = 55.0;
+/// [`CameraDirection::Auto`] is turned from the cloth's normal by these angles, degrees: about +y, and upwards.
+const AZIMUTH_OFFSET: f64 = 24.0;
+const ELEVATION_OFFSET: f64 = 12.0;
+/// The highest elevation of [`CameraDirection::Auto`], degrees.
+const MAX_ELEVATION: f64 = 55.0;
 
 /// A perspective camera.
 #[derive(Debug, Clone)]
@@ -20,22 +22,27 @@ pub(super) struct Camera {
     right: Vec3,
     up: Vec3,
     forward: Vec3,
-    /// Pixels per unit of x/z.
+    /// Focal length: pixels per unit of x/z.
     pub focal: f64,
     centre: [f64; 2],
     near: f64,
 }
 
 impl Camera {
-    /// A camera for `view`; `size` is width and height in pixels.
-    pub fn aimed(mesh: &TriMesh, faces: &[Drawable], view: &View, size: [usize; 2]) -> Self {
-        let (near_cloth, points) = subject(mesh, faces, view.framing);
-        let backward = match view.aim {
-            Aim::Auto => oblique(broad_side(mesh, &near_cloth)),
-            Aim::Angles { azimuth, elevation } => from_angles(azimuth, elevation),
+    /// The camera of a picture of `size`.
+    pub fn new(
+        mesh: &TriMesh,
+        faces: &[DrawableFace],
+        options: &PictureOptions,
+        size: PixelSize,
+    ) -> Self {
+        let (near_cloth, points) = subject(mesh, faces, options.framing);
+        let backward = match options.direction {
+            CameraDirection::Auto => oblique(broad_side(mesh, &near_cloth)),
+            CameraDirection::Angles { azimuth, elevation } => from_angles(azimuth, elevation),
         };
         let (right, up) = upright(backward);
-        let [width, height] = size.map(|s| s as f64);
+        let (width, height) = (size.width as f64, size.height as f64);
         let focal = 0.5 * width.min(height * 4.0 / 3.0) * 0.75 / HALF_FOV.tan();
         let mut camera = Self {
             eye: Vec3::zeros(),
@@ -46,19 +53,22 @@ impl Camera {
             centre: [0.5 * width, 0.5 * height],
             near: 0.0,
         };
-        camera.frame(&points, [width, height]);
+        camera.fit(&points, size);
         camera
     }
 
     /// Moves the eye so that all `points` just fit.
-    fn frame(&mut self, points: &[Vec3], size: [f64; 2]) {
-        let reach = size.map(|s| MARGIN * 0.5 * s / self.focal);
+    fn fit(&mut self, points: &[Vec3], size: PixelSize) {
+        let reach = [size.width, size.height].map(|s| MARGIN * 0.5 * s as f64 / self.focal);
         let mut target = middle(points);
         let mut distance: f64 = 1.0;
         let mut depth: f64 = 1.0;
-        // Recentring by what is seen converges quickly; three rounds are within a pixel.
+        // Centring the projected points converges quickly: three rounds are within a pixel.
         for _ in 0..3 {
-            let seen: Vec<Vec3> = points.iter().map(|p| self.turned(p - target)).collect();
+            let seen: Vec<Vec3> = points
+                .iter()
+                .map(|p| self.direction_in_axes(p - target))
+                .collect();
             distance = seen
                 .iter()
                 .map(|p| (p.x.abs() / reach[0]).max(p.y.abs() / reach[1]) - p.z)
@@ -78,22 +88,23 @@ impl Camera {
             target += self.right * shift(0) + self.up * shift(1);
         }
         self.eye = target - self.forward * distance;
-        // Cloth in front of what is framed would hide it.
+        // Cloth in front of the framed part would hide it, so it is cut off.
         self.near = (0.9 * distance - 1.5 * depth).max(1e-3 * distance);
     }
 
-    /// A direction in camera axes: x right, y up, z into the picture.
-    pub fn turned(&self, d: Vec3) -> Vec3 {
+    /// A direction of the scene in camera axes: x right, y up, z into the picture.
+    pub fn direction_in_axes(&self, d: Vec3) -> Vec3 {
         Vec3::new(d.dot(&self.right), d.dot(&self.up), d.dot(&self.forward))
     }
 
-    /// A point in camera axes, the eye at the origin.
-    pub fn seen(&self, p: &Vec3) -> Vec3 {
-        self.turned(p - self.eye)
+    /// A point of the scene in camera axes, the eye at the origin.
+    pub fn point_in_axes(&self, p: &Vec3) -> Vec3 {
+        self.direction_in_axes(p - self.eye)
     }
 
-    /// A point in camera axes as pixel x (right), pixel y (down) and depth; `None` when it is too near or behind.
-    pub fn projected(&self, seen: &Vec3) -> Option<Vec3> {
+    /// A point in camera axes as pixel x (right), pixel y (down) and depth; `None` if it is too near or behind the
+    /// camera.
+    pub fn project(&self, seen: &Vec3) -> Option<Vec3> {
         let scale = self.focal / seen.z;
         let point = Vec3::new(
             self.centre[0] + seen.x * scale,
@@ -103,8 +114,8 @@ impl Camera {
         (seen.z > self.near && point.iter().all(|c| c.is_finite())).then_some(point)
     }
 
-    /// The point in camera axes that lies at `depth` under the pixel position.
-    pub fn lifted(&self, pixel: [f64; 2], depth: f64) -> Vec3 {
+    /// The point in camera axes at a pixel position and depth; the inverse of [`Camera::project`].
+    pub fn unproject(&self, pixel: [f64; 2], depth: f64) -> Vec3 {
         let scale = depth / self.focal;
         Vec3::new(
             (pixel[0] - self.centre[0]) * scale,
@@ -114,8 +125,12 @@ impl Camera {
     }
 }
 
-/// The faces that decide the direction, and the points that must be in the picture.
-fn subject(mesh: &TriMesh, faces: &[Drawable], framing: Framing) -> (Vec<Drawable>, Vec<Vec3>) {
+/// The faces that determine the direction, and the points that must be in the picture.
+fn subject(
+    mesh: &TriMesh,
+    faces: &[DrawableFace],
+    framing: Framing,
+) -> (Vec<DrawableFace>, Vec<Vec3>) {
     let at = |v: usize| mesh.positions.get(v).copied().unwrap_or_default();
     match framing {
         Framing::Whole => (
@@ -123,7 +138,7 @@ fn subject(mesh: &TriMesh, faces: &[Drawable], framing: Framing) -> (Vec<Drawabl
             faces.iter().flat_map(|f| f.vertices).map(at).collect(),
         ),
         Framing::Focus { centre, radius } => {
-            let inside = |f: &&Drawable| {
+            let inside = |f: &&DrawableFace| {
                 f.vertices
                     .iter()
                     .any(|&v| (at(v) - centre).norm() <= radius)
@@ -149,8 +164,8 @@ fn middle(points: &[Vec3]) -> Vec3 {
 }
 
 /// The direction in which the cloth shows most of itself: the axis of least variance, on the side of the mean normal.
-fn broad_side(mesh: &TriMesh, faces: &[Drawable]) -> Vec3 {
-    let corners = |f: &Drawable| {
+fn broad_side(mesh: &TriMesh, faces: &[DrawableFace]) -> Vec3 {
+    let corners = |f: &DrawableFace| {
         f.vertices
             .map(|v| mesh.positions.get(v).copied().unwrap_or_default())
     };
@@ -180,7 +195,7 @@ fn broad_side(mesh: &TriMesh, faces: &[Drawable]) -> Vec3 {
         .eigenvectors
         .column(eigen.eigenvalues.imin())
         .into_owned();
-    // The mean normal of a closed or crumpled surface says little; then the axis alone decides, from the upper front.
+    // A closed or crumpled surface has no useful mean normal; its front is then the side that faces up and +z.
     let facing = if normal.norm() > 0.05 * weight {
         normal
     } else {
@@ -189,22 +204,26 @@ fn broad_side(mesh: &TriMesh, faces: &[Drawable]) -> Vec3 {
     if axis.dot(&facing) < 0.0 { -axis } else { axis }
 }
 
-/// Stands off a direction a little to the side and never from below: a person at a table or before a curtain.
+/// A direction turned a little to the side and upwards, and never from below: as a person looks at cloth on a table or
+/// a curtain.
 fn oblique(direction: Vec3) -> Vec3 {
-    // Cloth has two sides; from above is the side a person would look from.
+    // Cloth has two sides: take the one seen from above.
     let direction = if direction.y < -0.5 {
         -direction
     } else {
         direction
     };
     let elevation = direction.y.clamp(-1.0, 1.0).asin().to_degrees();
-    // Seen from straight above, azimuth means nothing: then it is the front.
+    // Seen from straight above the azimuth is arbitrary: take the front.
     let azimuth = if elevation > 75.0 {
         0.0
     } else {
         direction.x.atan2(direction.z).to_degrees()
     };
-    from_angles(azimuth + ASIDE, (elevation + LIFTED).clamp(LIFTED, HIGHEST))
+    from_angles(
+        azimuth + AZIMUTH_OFFSET,
+        (elevation + ELEVATION_OFFSET).clamp(ELEVATION_OFFSET, MAX_ELEVATION),
+    )
 }
 
 fn from_angles(azimuth: f64, elevation: f64) -> Vec3 {
@@ -217,7 +236,7 @@ fn from_angles(azimuth: f64, elevation: f64) -> Vec3 {
     }
 }
 
-/// Right and up of a camera whose back points along `backward`: +y is up, or −z when it looks along y.
+/// The right and up axes of a camera that looks against `backward`: +y is up, or −z when it looks along y.
 fn upright(backward: Vec3) -> (Vec3, Vec3) {
     let skyward = if backward.y.abs() > 0.98 {
         -Vec3::z() * backward.y.signum()
@@ -231,9 +250,15 @@ fn upright(backward: Vec3) -> (Vec3, Vec3) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::face::drawable_faces;
+
+    const PIXELS: PixelSize = PixelSize {
+        width: 400,
+        height: 300,
+    };
 
     #[test]
-    fn everything_framed_is_inside_the_picture() {
+    fn all_framed_points_are_inside_the_picture() {
         let positions: Vec<Vec3> = (0..60)
             .map(|k| {
                 Vec3::new(
@@ -247,30 +272,30 @@ mod tests {
             faces: (0..20).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect(),
             positions,
         };
-        let faces = super::super::drawable(&mesh);
-        for aim in [
-            Aim::Auto,
-            Aim::Angles {
+        let faces = drawable_faces(&mesh);
+        for direction in [
+            CameraDirection::Auto,
+            CameraDirection::Angles {
                 azimuth: 130.0,
                 elevation: 70.0,
             },
-            Aim::Angles {
+            CameraDirection::Angles {
                 azimuth: 0.0,
                 elevation: -90.0,
             },
         ] {
-            let camera = Camera::aimed(
+            let camera = Camera::new(
                 &mesh,
                 &faces,
-                &View {
-                    aim,
-                    ..View::default()
+                &PictureOptions {
+                    direction,
+                    ..PictureOptions::default()
                 },
-                [400, 300],
+                PIXELS,
             );
             for p in &mesh.positions {
                 let seen = camera
-                    .projected(&camera.seen(p))
+                    .project(&camera.point_in_axes(p))
                     .expect("in front of the camera");
                 assert!(
                     (0.0..=400.0).contains(&seen.x) && (0.0..=300.0).contains(&seen.y),
@@ -281,19 +306,19 @@ mod tests {
     }
 
     #[test]
-    fn lifting_undoes_projecting() {
+    fn unprojecting_inverts_projecting() {
         let mesh = TriMesh {
             positions: vec![Vec3::zeros(), Vec3::x(), Vec3::y()],
             faces: vec![[0, 1, 2]],
         };
-        let camera = Camera::aimed(
+        let camera = Camera::new(
             &mesh,
-            &super::super::drawable(&mesh),
-            &View::default(),
-            [400, 300],
+            &drawable_faces(&mesh),
+            &PictureOptions::default(),
+            PIXELS,
         );
-        let seen = camera.seen(&Vec3::new(0.3, 0.2, 0.1));
-        let on_screen = camera.projected(&seen).expect("in front of the camera");
-        assert!((camera.lifted([on_screen.x, on_screen.y], on_screen.z) - seen).norm() < 1e-9);
+        let seen = camera.point_in_axes(&Vec3::new(0.3, 0.2, 0.1));
+        let on_screen = camera.project(&seen).expect("in front of the camera");
+        assert!((camera.unproject([on_screen.x, on_screen.y], on_screen.z) - seen).norm() < 1e-9);
     }
 }

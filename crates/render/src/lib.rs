@@ -1,112 +1,50 @@
-//! Pictures of meshes, drawn in software: a z-buffer, three lights, a little occlusion; for a person to look at a result.
-//! May use mesh types and the `image` crate; a picture is a pure function of what is passed in.
-//! No glTF, no files, no windows: the command decides what is drawn in which colour.
+//! Pictures of meshes, drawn in software with a z-buffer, three lights and ambient occlusion.
+//!
+//! A picture depends on the arguments only. The crate knows no glTF, opens no file and no window; the caller chooses
+//! what is drawn in which colour.
 
 mod camera;
-pub mod chart;
-mod letters;
+mod face;
 mod occlusion;
+mod options;
 mod outline;
 mod raster;
 mod shade;
 
+pub use options::{CameraDirection, EdgeLines, Framing, MAX_SIDE, PictureOptions};
+pub use shade::{CLOTH, MENDED};
+
 use camera::Camera;
-use darn_geometry::mesh::{TriMesh, Vec3};
+use darn_geometry::mesh::TriMesh;
+use face::drawable_faces;
 use image::{Rgb, RgbImage};
+use options::PixelSize;
 use rayon::prelude::*;
 
-/// Base colour of cloth as it was scanned (sRGB).
-pub const CLOTH: [u8; 3] = [142, 160, 186];
-/// Base colour of cloth that was reconstructed (sRGB): warm, so that it is told from evidence at a glance.
-pub const MENDED: [u8; 3] = [226, 146, 88];
-
-/// The longest side of a picture, in pixels.
-pub const MAX_SIDE: u32 = 8192;
-
-/// Rows of pixels drawn at a time: bounds the memory of supersampling and is the grain of parallel work.
+/// Rows of pixels that are drawn at a time, on one thread. Few rows need little memory for their samples.
 const BAND: usize = 32;
 
-/// What the camera sees and how.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct View {
-    /// Width and height in pixels; clamped to 1 ..= [`MAX_SIDE`].
-    pub size: [u32; 2],
-    /// From where the camera looks.
-    pub aim: Aim,
-    /// How much of the mesh is in the picture.
-    pub framing: Framing,
-    /// Which edges are drawn.
-    pub lines: Lines,
-}
-
-impl Default for View {
-    fn default() -> Self {
-        Self {
-            size: [1200, 900],
-            aim: Aim::Auto,
-            framing: Framing::Whole,
-            lines: Lines::Rims,
-        }
-    }
-}
-
-/// From where the camera looks.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Aim {
-    /// Towards the broad side of the cloth, slightly oblique so that folds show.
-    Auto,
-    /// Degrees: azimuth turns about +y (0 looks from +z, 90 from +x), elevation lifts the camera (90 looks straight down).
-    Angles {
-        /// Turn about +y, degrees.
-        azimuth: f64,
-        /// Height over the horizon, degrees.
-        elevation: f64,
-    },
-}
-
-/// How much of the mesh is in the picture.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Framing {
-    /// All of it.
-    Whole,
-    /// A ball, say around a hole; `Aim::Auto` then faces the cloth inside the ball.
-    Focus {
-        /// Centre of the ball, scene space.
-        centre: Vec3,
-        /// Radius of the ball, scene units; must be positive.
-        radius: f64,
-    },
-}
-
-/// Which edges are drawn over the shading.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Lines {
-    /// Boundary edges only: the rims of holes and the border of the cloth.
-    Rims,
-    /// Every edge.
-    Wireframe,
-}
-
-/// Draws `mesh` with one base colour a face (`tints`, sRGB; missing ones are [`CLOTH`]).
+/// Draws `mesh` with one base colour for each face (`tints`, sRGB; missing ones are [`CLOTH`]).
 ///
-/// Vertices at one place must be one vertex (weld first), else every texture seam is drawn as a boundary. Faces with indices out of
-/// range or positions that are not finite are left out. Same input, same picture, whatever the number of threads.
-pub fn picture(mesh: &TriMesh, tints: &[[u8; 3]], view: &View) -> RgbImage {
-    let width = view.size[0].clamp(1, MAX_SIDE) as usize;
-    let height = view.size[1].clamp(1, MAX_SIDE) as usize;
-    let faces = drawable(mesh);
-    let camera = Camera::aimed(mesh, &faces, view, [width, height]);
+/// Vertices at the same position must be one vertex (weld first); otherwise every texture seam is drawn as a boundary.
+/// Faces with indices out of range or positions that are not finite are left out. The same input gives the same
+/// picture, with any number of threads.
+pub fn picture(mesh: &TriMesh, tints: &[[u8; 3]], options: &PictureOptions) -> RgbImage {
+    let [width, height] = options.size.map(|side| side.clamp(1, MAX_SIDE) as usize);
+    let size = PixelSize { width, height };
+    let faces = drawable_faces(mesh);
+    let camera = Camera::new(mesh, &faces, options, size);
     let triangles = raster::triangles(mesh, &faces, tints, &camera);
-    let segments = outline::segments(mesh, &faces, view.lines, &camera);
+    let segments = outline::segments(mesh, &faces, options.lines, &camera);
 
-    let bands: Vec<raster::Band> = (0..height.div_ceil(BAND))
+    let bands: Vec<raster::RowBand> = (0..height.div_ceil(BAND))
         .into_par_iter()
         .map(|band| {
             let rows = band * BAND..((band + 1) * BAND).min(height);
-            raster::draw(&triangles, &segments, [width, height], rows)
+            raster::draw(&triangles, &segments, size, rows)
         })
         .collect();
-    let pixels = raster::Pixels::joined(bands, [width, height]);
+    let pixels = raster::Pixels::joined(bands, size);
     let light = occlusion::visibility(&pixels, &camera);
 
     RgbImage::from_fn(width as u32, height as u32, |x, y| {
@@ -117,31 +55,10 @@ pub fn picture(mesh: &TriMesh, tints: &[[u8; 3]], view: &View) -> RgbImage {
     })
 }
 
-/// A face that can be drawn, with its place in the mesh.
-#[derive(Debug, Clone, Copy)]
-struct Drawable {
-    face: usize,
-    vertices: [usize; 3],
-}
-
-fn drawable(mesh: &TriMesh) -> Vec<Drawable> {
-    let sound = |&v: &u32| {
-        mesh.positions
-            .get(v as usize)
-            .is_some_and(|p| p.iter().all(|c| c.is_finite()))
-    };
-    let all = mesh.faces.iter().enumerate();
-    all.filter(|(_, f)| f.iter().all(sound))
-        .map(|(face, f)| Drawable {
-            face,
-            vertices: f.map(|v| v as usize),
-        })
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use darn_geometry::mesh::Vec3;
 
     /// A square sheet in the xy plane, `n` cells a side, with a square hole of `hole` cells in its middle.
     fn sheet(n: usize, hole: usize) -> TriMesh {
@@ -160,14 +77,14 @@ mod tests {
         TriMesh { positions, faces }
     }
 
-    fn small() -> View {
-        View {
+    fn small() -> PictureOptions {
+        PictureOptions {
             size: [80, 60],
-            aim: Aim::Angles {
+            direction: CameraDirection::Angles {
                 azimuth: 0.0,
                 elevation: 0.0,
             },
-            ..View::default()
+            ..PictureOptions::default()
         }
     }
 
@@ -177,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn the_cloth_is_in_the_middle_and_background_around_it() {
+    fn the_cloth_is_in_the_middle_of_the_background() {
         let mesh = sheet(8, 0);
         let drawn = picture(&mesh, &vec![MENDED; mesh.faces.len()], &small());
         assert!(
@@ -198,8 +115,8 @@ mod tests {
     #[test]
     fn both_sides_are_lit() {
         let mesh = sheet(4, 0);
-        let behind = View {
-            aim: Aim::Angles {
+        let behind = PictureOptions {
+            direction: CameraDirection::Angles {
                 azimuth: 180.0,
                 elevation: 0.0,
             },
@@ -227,18 +144,18 @@ mod tests {
     }
 
     #[test]
-    fn nothing_and_nonsense_give_a_picture_all_the_same() {
-        let nothing = picture(
+    fn empty_and_invalid_meshes_give_a_picture() {
+        let empty = picture(
             &TriMesh::default(),
             &[],
-            &View {
+            &PictureOptions {
                 size: [0, 3],
-                ..View::default()
+                ..PictureOptions::default()
             },
         );
-        assert_eq!(nothing.dimensions(), (1, 3));
+        assert_eq!(empty.dimensions(), (1, 3));
         let point = Vec3::new(1.0, 1.0, 1.0);
-        let nonsense = TriMesh {
+        let invalid = TriMesh {
             positions: vec![
                 point,
                 point,
@@ -248,14 +165,14 @@ mod tests {
             ],
             faces: vec![[0, 1, 2], [0, 1, 3], [0, 1, 99], [0, 1, 4]],
         };
-        for lines in [Lines::Rims, Lines::Wireframe] {
+        for lines in [EdgeLines::Rims, EdgeLines::Wireframe] {
             let drawn = picture(
-                &nonsense,
+                &invalid,
                 &[],
-                &View {
+                &PictureOptions {
                     size: [9, 9],
                     lines,
-                    ..View::default()
+                    ..PictureOptions::default()
                 },
             );
             assert_eq!(drawn.dimensions(), (9, 9));
@@ -265,12 +182,12 @@ mod tests {
     #[test]
     fn the_same_input_gives_the_same_picture() {
         let mesh = sheet(6, 2);
-        let view = View {
-            aim: Aim::Auto,
-            lines: Lines::Wireframe,
+        let options = PictureOptions {
+            direction: CameraDirection::Auto,
+            lines: EdgeLines::Wireframe,
             ..small()
         };
-        assert_eq!(picture(&mesh, &[], &view), picture(&mesh, &[], &view));
+        assert_eq!(picture(&mesh, &[], &options), picture(&mesh, &[], &options));
     }
 
     #[test]
@@ -284,7 +201,7 @@ mod tests {
         let near = picture(
             &mesh,
             &vec![MENDED; mesh.faces.len()],
-            &View { framing, ..small() },
+            &PictureOptions { framing, ..small() },
         );
         let cloth = |image: &RgbImage| image.pixels().filter(|p| warmth(p) > 60).count();
         assert!(cloth(&near) > cloth(&far));

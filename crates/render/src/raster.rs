@@ -1,50 +1,51 @@
-//! The z-buffer: triangles and lines drawn at three by three samples a pixel, a band of rows at a time.
+//! The z-buffer: draws triangles and lines with 3 × 3 samples a pixel, one band of rows at a time.
 
 use super::camera::Camera;
+use super::face::DrawableFace;
+use super::options::PixelSize;
 use super::outline::Segment;
-use super::shade::{self, Light, Side};
-use super::{CLOTH, Drawable};
+use super::shade::{self, CLOTH, FaceSide, LinearRgb};
 use darn_geometry::mesh::{TriMesh, Vec3};
 use std::ops::Range;
 
 /// Samples along a pixel's side.
 const SAMPLES: usize = 3;
 
-/// A triangle ready to be drawn.
+/// A face as the camera sees it.
 #[derive(Debug, Clone)]
-pub(super) struct Triangle {
+pub(super) struct ScreenTriangle {
     /// Pixel x, pixel y, depth of the corners.
     corners: [Vec3; 3],
     /// Corner normals in camera axes, facing the eye.
     normals: [Vec3; 3],
     /// Unit vectors from the corners to the eye, camera axes.
     to_eye: [Vec3; 3],
-    side: Side,
-    base: Light,
+    side: FaceSide,
+    base: LinearRgb,
 }
 
-/// All faces as the camera sees them; those with a corner too near are left out.
+/// All faces as the camera sees them, except those with a corner too near.
 pub(super) fn triangles(
     mesh: &TriMesh,
-    faces: &[Drawable],
+    faces: &[DrawableFace],
     tints: &[[u8; 3]],
     camera: &Camera,
-) -> Vec<Triangle> {
+) -> Vec<ScreenTriangle> {
     let normals = shade::vertex_normals(mesh, faces);
-    let at = |v: usize| camera.seen(&mesh.positions.get(v).copied().unwrap_or_default());
-    let smooth = |v: usize| camera.turned(normals.get(v).copied().unwrap_or_default());
-    let shown = |face: &Drawable| {
+    let at = |v: usize| camera.point_in_axes(&mesh.positions.get(v).copied().unwrap_or_default());
+    let smooth = |v: usize| camera.direction_in_axes(normals.get(v).copied().unwrap_or_default());
+    let shown = |face: &DrawableFace| {
         let seen = face.vertices.map(at);
-        let [a, b, c] = seen.each_ref().map(|p| camera.projected(p));
+        let [a, b, c] = seen.each_ref().map(|p| camera.project(p));
         let flat = shade::unit((seen[1] - seen[0]).cross(&(seen[2] - seen[0])));
-        // Camera axes are left-handed (z into the picture), so this cross product points away from the face's outside.
+        // Camera axes are left-handed (z into the picture), so this cross product points to the face's back.
         let side = if flat.dot(&seen[0]) >= 0.0 {
-            Side::Front
+            FaceSide::Front
         } else {
-            Side::Back
+            FaceSide::Back
         };
-        let facing = if side == Side::Front { 1.0 } else { -1.0 };
-        Some(Triangle {
+        let facing = if side == FaceSide::Front { 1.0 } else { -1.0 };
+        Some(ScreenTriangle {
             corners: [a?, b?, c?],
             normals: face.vertices.map(|v| smooth(v) * facing),
             to_eye: seen.map(|p| shade::unit(-p)),
@@ -55,30 +56,29 @@ pub(super) fn triangles(
     faces.iter().filter_map(shown).collect()
 }
 
-/// What one band of rows came to: one entry a pixel, row by row.
+/// The pixels of one band of rows, row by row.
 #[derive(Debug)]
-pub(super) struct Band {
-    colour: Vec<Light>,
+pub(super) struct RowBand {
+    colour: Vec<LinearRgb>,
     depth: Vec<f32>,
     normal: Vec<[f32; 3]>,
 }
 
-/// The whole picture before occlusion: one entry a pixel, row by row.
+/// The pixels of the whole picture before occlusion, row by row.
 #[derive(Debug)]
 pub(super) struct Pixels {
-    /// Width and height.
-    pub size: [usize; 2],
-    /// Light, samples averaged.
-    pub colour: Vec<Light>,
-    /// Depth at the pixel's centre; infinite where nothing is.
+    pub size: PixelSize,
+    /// Average of the samples.
+    pub colour: Vec<LinearRgb>,
+    /// Depth at the pixel's centre; infinite on the background.
     pub depth: Vec<f32>,
     /// Normal at the pixel's centre, camera axes.
     pub normal: Vec<[f32; 3]>,
 }
 
 impl Pixels {
-    /// The bands, which are in order from the top, as one picture.
-    pub fn joined(bands: Vec<Band>, size: [usize; 2]) -> Self {
+    /// The picture of all bands, which are in order from the top.
+    pub fn joined(bands: Vec<RowBand>, size: PixelSize) -> Self {
         let mut all = Self {
             size,
             colour: Vec::new(),
@@ -94,13 +94,13 @@ impl Pixels {
     }
 }
 
-/// Draws the given rows of a picture of `size` pixels.
+/// Draws some rows of a picture of `size`.
 pub(super) fn draw(
-    triangles: &[Triangle],
+    triangles: &[ScreenTriangle],
     segments: &[Segment],
-    size: [usize; 2],
+    size: PixelSize,
     rows: Range<usize>,
-) -> Band {
+) -> RowBand {
     let mut canvas = Canvas::new(size, rows);
     for triangle in triangles {
         canvas.fill(triangle);
@@ -111,23 +111,23 @@ pub(super) fn draw(
     canvas.resolved()
 }
 
-/// A band at full sample resolution.
+/// The samples of a band.
 struct Canvas {
     /// Samples in a row.
     width: usize,
     /// Sample rows of the band, counted from the picture's top.
     rows: Range<usize>,
-    colour: Vec<Light>,
+    colour: Vec<LinearRgb>,
     depth: Vec<f32>,
     normal: Vec<[f32; 3]>,
 }
 
 impl Canvas {
-    fn new(size: [usize; 2], rows: Range<usize>) -> Self {
-        let width = size[0] * SAMPLES;
+    fn new(size: PixelSize, rows: Range<usize>) -> Self {
+        let width = size.width * SAMPLES;
         let rows = rows.start * SAMPLES..rows.end * SAMPLES;
         let count = width * rows.len();
-        let behind = |y: usize| shade::background(y as f32 / (size[1] * SAMPLES) as f32);
+        let behind = |y: usize| shade::background(y as f32 / (size.height * SAMPLES) as f32);
         Self {
             width,
             colour: rows
@@ -140,10 +140,10 @@ impl Canvas {
         }
     }
 
-    /// The samples a box of pixel coordinates covers, within the band.
+    /// The columns and rows of samples in a box of pixel coordinates, within the band.
     fn covered(&self, low: [f64; 2], high: [f64; 2]) -> (Range<usize>, Range<usize>) {
         let samples = SAMPLES as f64;
-        // `as` saturates, so boxes far outside the picture come out empty.
+        // `as` saturates, so a box far outside the picture is empty.
         let x = (low[0] * samples).floor().max(0.0) as usize
             ..((high[0] * samples).ceil().max(0.0) as usize).min(self.width);
         let y = ((low[1] * samples).floor().max(0.0) as usize).max(self.rows.start)
@@ -151,7 +151,8 @@ impl Canvas {
         (x, y)
     }
 
-    fn fill(&mut self, t: &Triangle) {
+    /// Draws a triangle.
+    fn fill(&mut self, t: &ScreenTriangle) {
         let [a, b, c] = t.corners.map(|p| [p.x, p.y]);
         let doubled = cross(a, b, c);
         if doubled == 0.0 || !doubled.is_finite() {
@@ -184,7 +185,7 @@ impl Canvas {
     }
 
     /// Shades one sample; `weight` are barycentric coordinates on the triangle.
-    fn put(&mut self, at: usize, t: &Triangle, weight: [f64; 3], depth: f32) {
+    fn put(&mut self, at: usize, t: &ScreenTriangle, weight: [f64; 3], depth: f32) {
         let blended = |v: &[Vec3; 3]| {
             let sum = shade::unit(v[0] * weight[0] + v[1] * weight[1] + v[2] * weight[2]);
             [sum.x as f32, sum.y as f32, sum.z as f32]
@@ -200,9 +201,10 @@ impl Canvas {
         }
     }
 
+    /// Draws a line over the surface.
     fn stroke(&mut self, s: &Segment) {
         let [a, b] = s.ends.map(|p| [p.x, p.y]);
-        let reach = s.width * 0.5;
+        let reach = s.style.width * 0.5;
         let low = [a[0].min(b[0]) - reach, a[1].min(b[1]) - reach];
         let high = [a[0].max(b[0]) + reach, a[1].max(b[1]) + reach];
         let (columns, rows) = self.covered(low, high);
@@ -226,18 +228,18 @@ impl Canvas {
                 if let (Some(c), Some(d)) = (self.colour.get_mut(at), self.depth.get(at))
                     && depth - s.lift <= f64::from(*d)
                 {
-                    *c = shade::mixed(*c, s.ink, s.alpha);
+                    *c = shade::mixed(*c, s.style.ink, s.style.alpha);
                 }
             }
         }
     }
 
-    /// Samples averaged to pixels; depth and normal are those of the middle sample.
-    fn resolved(self) -> Band {
+    /// The pixels: the average colour of their samples, depth and normal of the middle sample.
+    fn resolved(self) -> RowBand {
         let across = self.width / SAMPLES;
         let down = self.rows.len() / SAMPLES;
         let share = 1.0 / (SAMPLES * SAMPLES) as f32;
-        let mut band = Band {
+        let mut band = RowBand {
             colour: Vec::new(),
             depth: Vec::new(),
             normal: Vec::new(),

@@ -1,4 +1,4 @@
-//! What both doors share: the pool, the one who mends, the limits, the metrics, and whether the service is ready.
+//! What HTTP and gRPC share: the mender, the worker pool, the sessions, the limits, the metrics, and the service's state.
 
 use std::{
     io,
@@ -18,44 +18,45 @@ use uuid::Uuid;
 
 use super::{
     config::ServeArgs,
-    pool::{Pool, PoolError},
-    problem::Fault,
-    session::Session,
-    sessions::{SessionLimits, Sessions},
+    error::RequestError,
+    job::PoolError,
+    kept_session::KeptSession,
+    pool::Pool,
+    session_store::{SessionLimits, SessionStore},
     telemetry::Metrics,
 };
-use darn_contract::port::{Cancellation, Class, Mender, Refusal};
+use darn_contract::port::{Cancellation, Mender, Refusal};
 
 /// The running service, apart from its sockets.
 pub struct App {
-    /// Counts everything.
+    /// The service's metrics.
     pub metrics: Metrics,
-    /// What a request may cost.
+    /// Limits of a request.
     pub limits: RequestLimits,
-    /// Web pages that may call, by origin; `*` for any.
+    /// Origins of web pages that may call; `*` for any.
     pub allow_origin: Vec<String>,
     /// Scans kept for editing.
-    pub sessions: Arc<Sessions>,
+    pub sessions: Arc<SessionStore>,
     pool: Pool,
-    /// Bodies that may still be received at once.
+    /// One permit per body that may be received at once.
     uploads: Arc<Semaphore>,
     mender: Arc<dyn Mender>,
     warm: AtomicBool,
     draining: AtomicBool,
 }
 
-/// The right to receive a body, if there is one, and to be put into the queue with it; free again when dropped.
+/// Allows one request to receive its body and to queue its job; given back when dropped.
 ///
-/// Apart from the places in the queue: a body that does not come on costs nobody a place. Bodies in memory are at most
-/// uploads, waiting and running jobs together, each of at most the body limit; a multipart one twice while it is split.
+/// It is not a place in the queue: a body that comes slowly takes no place. Memory holds at most one body per upload permit, waiting job
+/// and running job, each within the body limit; a multipart body counts twice while it is split.
 #[derive(Debug)]
-pub struct Upload(#[allow(dead_code, reason = "held for its drop")] OwnedSemaphorePermit);
+pub struct UploadPermit(#[allow(dead_code, reason = "held for its drop")] OwnedSemaphorePermit);
 
-/// When a request is over.
+/// When a request's result comes too late.
 #[derive(Debug, Clone, Copy)]
 struct Deadline {
     at: Instant,
-    /// How long it was, for a person.
+    /// The whole time allowed, for the error's text.
     length: Duration,
 }
 
@@ -66,16 +67,16 @@ impl Deadline {
     }
 }
 
-/// What a request may cost.
+/// Limits of a request.
 #[derive(Debug, Clone, Copy)]
 pub struct RequestLimits {
-    /// Waiting and mending together.
+    /// Longest time for waiting and mending together.
     pub deadline: Duration,
-    /// Bytes of a body.
+    /// Most bytes of a body.
     pub body: usize,
-    /// Between two pieces of a body.
+    /// Longest time between two pieces of a body.
     pub body_pause: Duration,
-    /// Bodies received at once.
+    /// Most bodies received at once.
     pub uploads: usize,
 }
 
@@ -89,18 +90,18 @@ impl std::fmt::Debug for App {
 }
 
 impl App {
-    /// Starts the workers; nothing is bound yet.
+    /// Starts the workers; binds no socket.
     ///
     /// # Errors
     /// When a thread cannot be started.
     pub fn start(settings: &ServeArgs, mender: Arc<dyn Mender>) -> io::Result<Arc<Self>> {
         let metrics = Metrics::new().map_err(io::Error::other)?;
         let pool = Pool::start(settings.workers(), settings.queue, metrics.pool())?;
-        let kept = SessionLimits {
+        let session_limits = SessionLimits {
             idle: settings.session_idle,
             memory: settings.session_memory,
         };
-        let sessions = Sessions::new(kept, metrics.sessions());
+        let sessions = SessionStore::new(session_limits, metrics.sessions());
         Ok(Arc::new(Self {
             metrics,
             limits: RequestLimits {
@@ -119,82 +120,84 @@ impl App {
         }))
     }
 
-    /// One real mend on a worker; from then on the service is ready. Has no deadline: a cold machine may be slow once.
+    /// Runs the mender's warm-up on a worker; after it the service is ready. An hour's deadline: the first mend on a machine may be slow.
     ///
     /// # Errors
-    /// The mend's, or that of the pool.
-    pub async fn warm_up(&self) -> Result<(), Fault> {
+    /// The mender's refusal or the pool's error.
+    pub async fn warm_up(&self) -> Result<(), RequestError> {
         let deadline = Deadline::after(Duration::from_secs(3600));
-        self.work(None, deadline, |mender, _| mender.warm_up())
+        self.run_job(None, deadline, |mender, _| mender.warm_up())
             .await?;
         self.warm.store(true, Relaxed);
         Ok(())
     }
 
-    /// Takes the right to receive a body; before it is read, and only while the queue has room for it.
+    /// Takes an upload permit before a body is read, and only while the queue has room.
     ///
     /// # Errors
     /// `UploadsFull`, `QueueFull` or `Draining`.
-    pub fn upload(&self) -> Result<Upload, Fault> {
+    pub fn upload_permit(&self) -> Result<UploadPermit, RequestError> {
         let permit = Arc::clone(&self.uploads).try_acquire_owned();
-        // Asked after the permit was taken: who has one from before the drain is waited for.
-        self.serving()?;
-        let upload = permit.map(Upload).map_err(|_| Fault::UploadsFull {
-            limit: self.limits.uploads,
-            retry_after: self.limits.body_pause.as_secs().clamp(1, 60),
-        })?;
-        (self.pool.room()).map_err(|error| fault(error, self.limits.deadline))?;
+        // Checked after the permit was taken: a drain waits for the permits taken before it.
+        self.check_serving()?;
+        let upload = permit
+            .map(UploadPermit)
+            .map_err(|_| RequestError::UploadsFull {
+                limit: self.limits.uploads,
+                retry_after: self.limits.body_pause.as_secs().clamp(1, 60),
+            })?;
+        (self.pool.check_capacity()).map_err(|error| of_pool(error, self.limits.deadline))?;
         Ok(upload)
     }
 
-    /// Takes a place in the queue and runs a job on a worker, within the deadline.
+    /// Runs a job on a worker, within the deadline.
     ///
     /// # Errors
-    /// The job's, `QueueFull`, `Deadline`, `Draining`, or `Internal` when it panicked.
+    /// `Refused`, `QueueFull`, `Deadline`, `Draining`, or `Internal` when the mender failed or panicked.
     pub async fn submit<T: Send + 'static>(
         &self,
-        upload: Upload,
+        upload: UploadPermit,
         job: impl FnOnce(&dyn Mender, Cancellation<'_>) -> Result<T, Refusal> + Send + 'static,
-    ) -> Result<T, Fault> {
+    ) -> Result<T, RequestError> {
         let deadline = Deadline::after(self.limits.deadline);
-        self.work(Some(upload), deadline, job).await
+        self.run_job(Some(upload), deadline, job).await
     }
 
-    /// Runs a job on a kept session, on a worker, in the session's turn and within the deadline, which covers waiting for the
-    /// turn. Who waits for a turn holds neither worker nor place in the queue: one session cannot keep others from theirs.
-    /// The session is kept until the job ends, whether or not its caller still waits.
+    /// Runs a job on a session, on a worker, within the deadline, which includes waiting for exclusive use of the session. A request that
+    /// waits for it holds neither a worker nor a place in the queue, so one session cannot block others. The session is kept until
+    /// the job ends, even when the caller leaves earlier.
     ///
     /// # Errors
-    /// `Session` when it is not to be had, and all that `submit` has.
-    pub async fn submit_to<T: Send + 'static>(
+    /// `Session` when the session cannot be used, and those of [`App::submit`].
+    pub async fn submit_to_session<T: Send + 'static>(
         &self,
         id: Uuid,
-        upload: Upload,
-        job: impl FnOnce(&Session, Cancellation<'_>) -> Result<T, Refusal> + Send + 'static,
-    ) -> Result<T, Fault> {
+        upload: UploadPermit,
+        job: impl FnOnce(&KeptSession, Cancellation<'_>) -> Result<T, Refusal> + Send + 'static,
+    ) -> Result<T, RequestError> {
         let deadline = Deadline::after(self.limits.deadline);
         let lease = self.sessions.lease(id, std::time::Instant::now())?;
-        let turn = timeout_at(deadline.at, lease.turn()).await;
-        let turn = turn.map_err(|_| fault(PoolError::Expired, deadline.length))?;
-        self.work(Some(upload), deadline, move |_, cancellation| {
-            turn.work(|session| job(session, cancellation))
+        let guard = timeout_at(deadline.at, lease.exclusive()).await;
+        let guard = guard.map_err(|_| of_pool(PoolError::Expired, deadline.length))?;
+        self.run_job(Some(upload), deadline, move |_, cancellation| {
+            guard.run(|session| job(session, cancellation))
         })
         .await
     }
 
-    async fn work<T: Send + 'static>(
+    async fn run_job<T: Send + 'static>(
         &self,
-        upload: Option<Upload>,
+        upload: Option<UploadPermit>,
         deadline: Deadline,
         job: impl FnOnce(&dyn Mender, Cancellation<'_>) -> Result<T, Refusal> + Send + 'static,
-    ) -> Result<T, Fault> {
+    ) -> Result<T, RequestError> {
         let mender = Arc::clone(&self.mender);
-        let outcome = match self.pool.admit() {
-            Ok(admission) => {
-                let answer = (self.pool).run(admission, deadline.at, move |cancellation| {
+        let outcome = match self.pool.reserve() {
+            Ok(permit) => {
+                let answer = (self.pool).run(permit, deadline.at, move |cancellation| {
                     job(&*mender, cancellation)
                 });
-                // Not before the job is in the queue, which a drain closes when no upload is left.
+                // Only now that the job is queued: a drain closes the queue once no upload permit is taken.
                 drop(upload);
                 answer.await
             }
@@ -202,74 +205,73 @@ impl App {
         };
         match outcome {
             Ok(Ok(value)) => Ok(value),
-            Ok(Err(refusal)) => {
-                if refusal.class == Class::Internal {
-                    error!(
-                        code = refusal.code,
-                        detail = refusal.detail,
-                        "mending failed"
-                    );
-                }
-                Err(Fault::Refused(refusal))
+            Ok(Err(refusal)) if refusal.is_internal() => {
+                let code = refusal.code.word;
+                error!(code, detail = refusal.detail, "mending failed");
+                Err(RequestError::Internal)
             }
-            Err(error) => Err(fault(error, deadline.length)),
+            Ok(Err(refusal)) => Err(RequestError::Refused(refusal)),
+            Err(error) => Err(of_pool(error, deadline.length)),
         }
     }
 
-    /// Whether new requests will be mended.
+    /// Checks that the service is warm and does not shut down.
     ///
     /// # Errors
     /// `WarmingUp` or `Draining`.
-    pub fn ready(&self) -> Result<(), Fault> {
-        self.serving()?;
-        match self.warm.load(Relaxed) {
-            true => Ok(()),
-            false => Err(Fault::WarmingUp),
+    pub fn ready(&self) -> Result<(), RequestError> {
+        self.check_serving()?;
+        if self.warm.load(Relaxed) {
+            Ok(())
+        } else {
+            Err(RequestError::WarmingUp)
         }
     }
 
-    /// Whether the service shuts down.
+    /// Checks that the service does not shut down.
     ///
     /// # Errors
     /// `Draining`.
-    pub fn serving(&self) -> Result<(), Fault> {
-        match self.draining.load(Relaxed) {
-            true => Err(Fault::Draining),
-            false => Ok(()),
+    pub fn check_serving(&self) -> Result<(), RequestError> {
+        if self.draining.load(Relaxed) {
+            Err(RequestError::Draining)
+        } else {
+            Ok(())
         }
     }
 
-    /// Stops being ready and takes no more requests; those whose bodies are still coming, and jobs taken, go on.
+    /// Refuses new requests, waits for the bodies being received, then closes the queue; its jobs still run.
     pub async fn drain(&self) {
         self.draining.store(true, Relaxed);
         let all = u32::try_from(self.limits.uploads).unwrap_or(u32::MAX);
-        // Never closed, so never an error.
+        // The semaphore is never closed, so this is never an error.
         self.uploads.acquire_many(all).await.ok();
         self.pool.close();
     }
 
-    /// Takes no more jobs at all.
+    /// Closes the queue at once.
     pub fn close(&self) {
         self.draining.store(true, Relaxed);
         self.pool.close();
     }
 }
 
-fn fault(error: PoolError, patience: Duration) -> Fault {
+/// The error that a caller receives when the pool gave no result; `deadline` is the time that was allowed.
+fn of_pool(error: PoolError, deadline: Duration) -> RequestError {
     match error {
         PoolError::Full {
             waiting,
             running,
             retry_after,
-        } => Fault::QueueFull {
+        } => RequestError::QueueFull {
             waiting,
             running,
             retry_after,
         },
-        PoolError::Closed => Fault::Draining,
-        PoolError::Expired => Fault::Deadline {
-            seconds: patience.as_secs_f64(),
+        PoolError::Closed => RequestError::Draining,
+        PoolError::Expired => RequestError::Deadline {
+            seconds: deadline.as_secs_f64(),
         },
-        PoolError::Panicked => Fault::Internal,
+        PoolError::Panicked => RequestError::Internal,
     }
 }

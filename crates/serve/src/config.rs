@@ -1,4 +1,4 @@
-//! Settings: a flag, or a `DARN_*` variable, and nothing else. All are parsed before anything is bound.
+//! The service's settings, each a flag or a `DARN_*` variable. All are parsed before a socket is bound.
 
 use std::{net::SocketAddr, ops::RangeInclusive, time::Duration};
 
@@ -6,8 +6,8 @@ use clap::Args;
 
 use super::telemetry::LogFormat;
 
-/// Most jobs that may wait, and most bodies received at once.
-const MOST_WAITING: usize = 65_536;
+/// Upper bound of the settings `queue` and `uploads`.
+const MAX_WAITING: usize = 65_536;
 
 /// Serve HTTP and gRPC.
 #[derive(Debug, Clone, Args)]
@@ -88,17 +88,17 @@ pub struct ServeArgs {
 }
 
 impl ServeArgs {
-    /// Worker threads: as set, else two per processor, as one waits while the shared threads do what can be divided.
+    /// Worker threads. Without a setting two per processor, since a worker waits while the shared threads do its parallel work.
     pub fn workers(&self) -> usize {
         self.workers.unwrap_or_else(|| {
             2 * std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
         })
     }
 
-    /// Bodies received at once: as set, else a few times what is mended and waits.
+    /// Bodies received at once. Without a setting four times the workers and the queue together.
     pub fn uploads(&self) -> usize {
         self.uploads
-            .unwrap_or_else(|| (4 * (self.workers() + self.queue)).min(MOST_WAITING))
+            .unwrap_or_else(|| (4 * (self.workers() + self.queue)).min(MAX_WAITING))
     }
 }
 
@@ -107,11 +107,11 @@ fn workers(text: &str) -> Result<usize, String> {
 }
 
 fn queue(text: &str) -> Result<usize, String> {
-    within(text, 0..=MOST_WAITING)
+    within(text, 0..=MAX_WAITING)
 }
 
 fn uploads(text: &str) -> Result<usize, String> {
-    within(text, 1..=MOST_WAITING)
+    within(text, 1..=MAX_WAITING)
 }
 
 fn within(text: &str, range: RangeInclusive<usize>) -> Result<usize, String> {
@@ -125,7 +125,7 @@ fn within(text: &str, range: RangeInclusive<usize>) -> Result<usize, String> {
     }
 }
 
-/// `*`, or scheme://host with an optional port, as a browser writes it: in small letters and without a path.
+/// `*`, or scheme://host with an optional port, in lower case and without a path, as browsers send it.
 fn origin(text: &str) -> Result<String, String> {
     let text = text.trim();
     let is_origin = || {
@@ -133,13 +133,13 @@ fn origin(text: &str) -> Result<String, String> {
         let mut letters = scheme.bytes();
         let scheme = letters.next()?.is_ascii_alphabetic()
             && letters.all(|b| b.is_ascii_alphanumeric() || b"+-.".contains(&b));
-        let plain = |b: u8| b.is_ascii_alphanumeric() || b"-._:[]".contains(&b);
+        let is_plain = |b: u8| b.is_ascii_alphanumeric() || b"-._:[]".contains(&b);
         let (name, port) = match host.rsplit_once(':') {
             Some((name, port)) if !port.ends_with(']') => (name, Some(port)),
             _ => (host, None),
         };
         let port = port.is_none_or(|port| port.parse::<u16>().is_ok());
-        Some(scheme && port && !name.is_empty() && name.bytes().all(plain))
+        Some(scheme && port && !name.is_empty() && name.bytes().all(is_plain))
     };
     if text == "*" || is_origin() == Some(true) {
         Ok(text.to_ascii_lowercase())
@@ -181,7 +181,7 @@ fn duration(text: &str) -> Result<Duration, String> {
     let number: u64 = number
         .parse()
         .map_err(|_| "must be a whole number and a unit, such as 30s")?;
-    // A year is longer than anything waits, and far from overflowing an instant.
+    // Longer than any use, and far from overflowing an `Instant`.
     match number.checked_mul(milliseconds) {
         Some(ms @ 1..=31_536_000_000) => Ok(Duration::from_millis(ms)),
         _ => Err("must be between 1ms and a year".to_owned()),

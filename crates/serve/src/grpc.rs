@@ -1,4 +1,4 @@
-//! The gRPC door: the same jobs, limits and errors as the HTTP one.
+//! The gRPC service: the same jobs, limits and errors as over HTTP.
 
 use std::{
     pin::Pin,
@@ -11,9 +11,9 @@ use tonic::{Code, Request, Response, Status, Streaming, codegen::tokio_stream::S
 
 use super::{
     app::App,
-    intake::{Asked, Patience},
-    problem::Fault,
-    question::Question,
+    body::{BodyTimer, ScanRequest},
+    error::RequestError,
+    parameters::Parameters,
     telemetry::RequestId,
 };
 use darn_contract::port::Mended;
@@ -27,171 +27,177 @@ use darn_contract::{
 };
 
 /// Bytes of a scan per message of an answer.
-const CHUNK: usize = 256 << 10;
-/// Bytes of a message that comes in. Read as messages, empty ones at worst, they take up to 36 times as much memory: as much as a body of
-/// the usual limit.
-const MESSAGE: usize = 4 << 20;
+const CHUNK_BYTES: usize = 256 << 10;
+/// Most bytes of an incoming message. Decoded, its nested messages take up to 36 times as much memory: about the default body limit.
+const MAX_MESSAGE_BYTES: usize = 4 << 20;
 
 /// The service, ready to be routed.
-pub fn service(app: &Arc<App>) -> DarnServer<Door> {
-    DarnServer::new(Door(Arc::clone(app)))
-        .max_decoding_message_size(MESSAGE)
+pub fn service(app: &Arc<App>) -> DarnServer<GrpcService> {
+    DarnServer::new(GrpcService(Arc::clone(app)))
+        .max_decoding_message_size(MAX_MESSAGE_BYTES)
         .max_encoding_message_size(usize::MAX)
 }
 
 /// Answers gRPC calls.
 #[derive(Debug)]
-pub struct Door(Arc<App>);
+pub struct GrpcService(Arc<App>);
 
 #[tonic::async_trait]
-impl Darn for Door {
-    type InpaintStream = Chunks;
+impl Darn for GrpcService {
+    type InpaintStream = MendedStream;
 
     async fn find_holes(
         &self,
         request: Request<Streaming<ScanChunk>>,
     ) -> Result<Response<HolesReport>, Status> {
-        let id = id(&request);
+        let id = request_id(&request);
         self.holes(request.into_inner())
             .await
             .map(Response::new)
-            .map_err(|fault| fault.grpc(&id))
+            .map_err(|error| error.grpc(&id))
     }
 
     async fn inpaint(
         &self,
         request: Request<Streaming<ScanChunk>>,
-    ) -> Result<Response<Chunks>, Status> {
-        let id = id(&request);
+    ) -> Result<Response<MendedStream>, Status> {
+        let id = request_id(&request);
         let mended = self
             .mend(request.into_inner())
             .await
-            .map_err(|fault| fault.grpc(&id))?;
-        Ok(Response::new(Chunks::of(mended)))
+            .map_err(|error| error.grpc(&id))?;
+        Ok(Response::new(MendedStream::of(mended)))
     }
 
     async fn optimize_anchor(
         &self,
         request: Request<Streaming<ScanChunk>>,
     ) -> Result<Response<AnchorFound>, Status> {
-        let id = id(&request);
+        let id = request_id(&request);
         self.search(request.into_inner())
             .await
             .map(Response::new)
-            .map_err(|fault| fault.grpc(&id))
+            .map_err(|error| error.grpc(&id))
     }
 }
 
-impl Door {
-    async fn holes(&self, stream: Streaming<ScanChunk>) -> Result<HolesReport, Fault> {
-        let Asked { scan, upload, .. } = self.read(stream).await?.unconstrained()?;
+impl GrpcService {
+    async fn holes(&self, stream: Streaming<ScanChunk>) -> Result<HolesReport, RequestError> {
+        let received = self.receive(stream).await?;
+        let ScanRequest { scan, upload, .. } = received.without_constraints()?;
         self.0
-            .submit(upload, move |mender, _| mender.find_holes(&scan))
+            .submit(upload, move |mender, _| mender.find_holes(scan))
             .await
     }
 
-    async fn mend(&self, stream: Streaming<ScanChunk>) -> Result<Mended, Fault> {
-        let Asked {
+    async fn mend(&self, stream: Streaming<ScanChunk>) -> Result<Mended, RequestError> {
+        let ScanRequest {
             scan,
-            question,
+            parameters,
             upload,
-        } = self.read::<Constraints>(stream).await?;
-        let asked = question.unwrap_or_default();
+        } = self.receive::<Constraints>(stream).await?;
+        let constraints = parameters.unwrap_or_default();
         let mended = self
             .0
             .submit(upload, move |mender, cancellation| {
-                mender.inpaint(&scan, &asked, cancellation)
+                mender.inpaint(scan, &constraints, cancellation)
             })
             .await?;
         self.0.metrics.mended(&mended.report);
         Ok(mended)
     }
 
-    async fn search(&self, stream: Streaming<ScanChunk>) -> Result<AnchorFound, Fault> {
-        let Asked {
+    async fn search(&self, stream: Streaming<ScanChunk>) -> Result<AnchorFound, RequestError> {
+        let ScanRequest {
             scan,
-            question,
+            parameters,
             upload,
-        } = self.read::<Search>(stream).await?;
+        } = self.receive::<Search>(stream).await?;
         let place = "the field `query` of the first chunk";
-        let search = question.ok_or(Fault::NoQuery { place })?;
+        let search = parameters.ok_or(RequestError::NoQuery { place })?;
         self.0
             .submit(upload, move |mender, cancellation| {
-                mender.optimize_anchor(&scan, &search, cancellation)
+                mender.optimize_anchor(scan, &search, cancellation)
             })
             .await
     }
 
-    async fn read<Q: Carried>(&self, mut stream: Streaming<ScanChunk>) -> Result<Asked<Q>, Fault> {
-        let upload = self.0.upload()?;
+    /// Reads the chunks of a request.
+    async fn receive<P: ChunkParameters>(
+        &self,
+        mut stream: Streaming<ScanChunk>,
+    ) -> Result<ScanRequest<P>, RequestError> {
+        let upload = self.0.upload_permit()?;
         let limit = self.0.limits.body;
-        let patience = Patience::new(&self.0.limits);
-        let mut question = None;
+        let timer = BodyTimer::new(&self.0.limits);
+        let mut parameters = None;
         let mut scan = BytesMut::new();
         let mut first = true;
-        while let Some(mut chunk) = patience
+        while let Some(mut chunk) = timer
             .next(stream.message())
             .await?
-            .map_err(|status| broken(&status))?
+            .map_err(|status| stream_error(&status))?
         {
-            if let Some(message) = Q::take(&mut chunk) {
+            if let Some(message) = P::take(&mut chunk) {
                 if !first {
-                    let part = Q::PART;
+                    let part = P::PART;
                     let detail = format!("only the first chunk carries `{part}`");
-                    return Err(Fault::Malformed(detail));
+                    return Err(RequestError::Malformed(detail));
                 }
-                question = Some(Q::of(&message)?);
+                parameters = Some(P::from_message(&message)?);
             }
             if chunk.constraints.is_some() || chunk.query.is_some() {
-                return Err(Fault::Malformed(
+                return Err(RequestError::Malformed(
                     "OptimizeAnchor takes a query and no constraints, the other methods no query"
                         .to_owned(),
                 ));
             }
             if scan.len() + chunk.data.len() > limit {
-                return Err(Fault::TooLarge { limit });
+                return Err(RequestError::TooLarge { limit });
             }
             scan.extend_from_slice(&chunk.data);
             first = false;
         }
         if scan.is_empty() {
-            return Err(Fault::EmptyBody);
+            return Err(RequestError::EmptyBody);
         }
-        Ok(Asked {
+        Ok(ScanRequest {
             scan: scan.freeze(),
-            question,
+            parameters,
             upload,
         })
     }
 }
 
-/// A question with its own field in a chunk.
-trait Carried: Question {
-    /// Takes it out of a chunk.
+/// Parameters as a field of a chunk.
+trait ChunkParameters: Parameters {
+    /// Takes their message out of a chunk.
     fn take(chunk: &mut ScanChunk) -> Option<Self::Message>;
 }
 
-impl Carried for Constraints {
+impl ChunkParameters for Constraints {
     fn take(chunk: &mut ScanChunk) -> Option<v1::Constraints> {
         chunk.constraints.take()
     }
 }
 
-impl Carried for Search {
+impl ChunkParameters for Search {
     fn take(chunk: &mut ScanChunk) -> Option<v1::AnchorQuery> {
         chunk.query.take()
     }
 }
 
-fn broken(status: &Status) -> Fault {
+fn stream_error(status: &Status) -> RequestError {
     match status.code() {
-        // What tonic says of a message above its limit.
-        Code::OutOfRange => Fault::MessageTooLarge { limit: MESSAGE },
-        _ => Fault::Malformed(format!("the stream broke off: {}", status.message())),
+        // tonic's code for a message above its limit.
+        Code::OutOfRange => RequestError::MessageTooLarge {
+            limit: MAX_MESSAGE_BYTES,
+        },
+        _ => RequestError::Malformed(format!("the stream broke off: {}", status.message())),
     }
 }
 
-fn id<T>(request: &Request<T>) -> String {
+fn request_id<T>(request: &Request<T>) -> String {
     request
         .extensions()
         .get::<RequestId>()
@@ -199,14 +205,14 @@ fn id<T>(request: &Request<T>) -> String {
         .unwrap_or_default()
 }
 
-/// An answer in chunks: the report, then the scan.
+/// A mended scan in chunks: the report, then the scan's bytes in order.
 #[derive(Debug)]
-pub struct Chunks {
+pub struct MendedStream {
     report: Option<Part>,
     scan: Bytes,
 }
 
-impl Chunks {
+impl MendedStream {
     fn of(mended: Mended) -> Self {
         Self {
             report: Some(Part::Report(mended.report)),
@@ -215,12 +221,12 @@ impl Chunks {
     }
 }
 
-impl Stream for Chunks {
+impl Stream for MendedStream {
     type Item = Result<InpaintChunk, Status>;
 
     fn poll_next(mut self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<Option<Self::Item>> {
         let part = self.report.take().or_else(|| {
-            let next = self.scan.len().min(CHUNK);
+            let next = self.scan.len().min(CHUNK_BYTES);
             (next > 0).then(|| Part::Data(self.scan.split_to(next)))
         });
         Poll::Ready(part.map(|part| Ok(InpaintChunk { part: Some(part) })))

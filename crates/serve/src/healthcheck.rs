@@ -1,4 +1,4 @@
-//! Asks a running service whether it is ready, as a container's health check does.
+//! Asks a running service whether it is ready, for a container's health check.
 
 use std::{
     io::{Read, Write},
@@ -6,32 +6,32 @@ use std::{
     time::Duration,
 };
 
-/// Why a service is not known to be ready.
+/// Why a service does not count as ready.
 #[derive(Debug, thiserror::Error)]
 pub enum HealthError {
-    /// Nobody answered.
+    /// There was no answer.
     #[error("{address} does not answer: {source}")]
-    Silent {
-        /// Where it was asked.
+    NoAnswer {
+        /// The address asked.
         address: SocketAddr,
-        /// What came instead.
+        /// The I/O error.
         source: std::io::Error,
     },
-    /// It answered that it is not ready.
+    /// The answer was not 200.
     #[error("{address} is not ready: {answer}")]
     NotReady {
-        /// Where it was asked.
+        /// The address asked.
         address: SocketAddr,
         /// Its status line.
         answer: String,
     },
 }
 
-/// Asks `/readyz` of the service that listens on `listen`; an unspecified address (`0.0.0.0`) is asked on the loopback.
+/// Requests `/readyz` of the service that listens on `listen`; for an unspecified address (`0.0.0.0`, `::`) on the loopback address.
 ///
 /// # Errors
-/// When it does not answer within `patience`, or answers anything but 200.
-pub fn healthcheck(listen: SocketAddr, patience: Duration) -> Result<(), HealthError> {
+/// The service does not answer within `timeout`, or answers anything but 200.
+pub fn healthcheck(listen: SocketAddr, timeout: Duration) -> Result<(), HealthError> {
     let ip = match listen.ip() {
         IpAddr::V4(ip) if ip.is_unspecified() => Ipv4Addr::LOCALHOST.into(),
         IpAddr::V6(ip) if ip.is_unspecified() => Ipv6Addr::LOCALHOST.into(),
@@ -39,7 +39,7 @@ pub fn healthcheck(listen: SocketAddr, patience: Duration) -> Result<(), HealthE
     };
     let address = SocketAddr::new(ip, listen.port());
     let answer =
-        ask(address, patience).map_err(|source| HealthError::Silent { address, source })?;
+        ask(address, timeout).map_err(|source| HealthError::NoAnswer { address, source })?;
     let line = answer.lines().next().unwrap_or_default();
     if line.split(' ').nth(1) == Some("200") {
         Ok(())
@@ -51,10 +51,10 @@ pub fn healthcheck(listen: SocketAddr, patience: Duration) -> Result<(), HealthE
     }
 }
 
-fn ask(address: SocketAddr, patience: Duration) -> std::io::Result<String> {
-    let mut stream = TcpStream::connect_timeout(&address, patience)?;
-    stream.set_read_timeout(Some(patience))?;
-    stream.set_write_timeout(Some(patience))?;
+fn ask(address: SocketAddr, timeout: Duration) -> std::io::Result<String> {
+    let mut stream = TcpStream::connect_timeout(&address, timeout)?;
+    stream.set_read_timeout(Some(timeout))?;
+    stream.set_write_timeout(Some(timeout))?;
     stream.write_all(
         format!("GET /readyz HTTP/1.1\r\nhost: {address}\r\nconnection: close\r\n\r\n").as_bytes(),
     )?;

@@ -1,57 +1,91 @@
-//! A job in the queue of the pool: the work, who waits for it and until when, and its place.
+//! A job in the pool's queue: its work, its caller, its deadline and its place.
 //!
-//! It carries all that belongs to it, so whatever becomes of it is settled in one spot: whoever dropped the reply does not wait,
-//! a panic is this job's error, and the place is free again when the job is dropped.
+//! A job owns all of these, so dropping it settles them: its caller gets an answer and its place is free again.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use tokio::{sync::oneshot, time::Instant};
+use tokio::{
+    sync::{OwnedSemaphorePermit, oneshot},
+    time::Instant,
+};
 use tracing::{Span, warn};
 
-use super::{
-    pool::{Admission, PoolError},
-    telemetry::PoolMetrics,
-};
+use super::telemetry::PoolMetrics;
 use darn_contract::port::Cancellation;
 
-/// A job of any type, in the queue.
-pub trait Entry: Send {
-    /// Whether somebody still waits, and still may.
+/// Why a job has no result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum PoolError {
+    /// Every place is taken.
+    #[error("{waiting} jobs wait and {running} run")]
+    Full {
+        /// Jobs waiting.
+        waiting: usize,
+        /// Jobs running.
+        running: usize,
+        /// Estimated seconds until a place is free, at least 1.
+        retry_after: u64,
+    },
+    /// The pool takes no more jobs.
+    #[error("the pool is closed")]
+    Closed,
+    /// The deadline passed while the job waited or ran.
+    #[error("the deadline passed")]
+    Expired,
+    /// The job panicked.
+    #[error("the job panicked")]
+    Panicked,
+}
+
+/// A place in the queue, or at a worker; given back when dropped.
+#[derive(Debug)]
+pub struct QueuePermit(#[allow(dead_code, reason = "held for its drop")] OwnedSemaphorePermit);
+
+impl QueuePermit {
+    /// The place that a permit of the pool's semaphore stands for.
+    pub fn new(permit: OwnedSemaphorePermit) -> Self {
+        Self(permit)
+    }
+}
+
+/// A job with any type of result, as the queue sees it.
+pub trait QueuedJob: Send {
+    /// Whether its caller still waits and its deadline has not passed.
     fn is_wanted(&self) -> bool;
-    /// When it came into the queue.
-    fn entered(&self) -> Instant;
-    /// Runs it and sends its result to who waits.
+    /// When it was queued.
+    fn queued_at(&self) -> Instant;
+    /// Runs it and sends its result to its caller.
     fn run(self: Box<Self>, metrics: &PoolMetrics);
 }
 
-/// A job of one type, with all that belongs to it.
+/// A job with a result of type `T`.
 pub struct Job<T, W> {
-    /// What is to be done.
+    /// What to run.
     pub work: W,
     /// Where its result goes; closed when nobody waits for it any more.
     pub reply: oneshot::Sender<Result<T, PoolError>>,
-    /// When its result is too late.
+    /// When its result comes too late.
     pub deadline: Instant,
-    /// When it came into the queue.
-    pub entered: Instant,
-    /// The request it belongs to.
+    /// When it was queued.
+    pub queued_at: Instant,
+    /// The log span of its request.
     pub span: Span,
     /// Its place.
-    pub admission: Admission,
+    pub permit: QueuePermit,
 }
 
-/// Whether somebody still waits, and still may.
+/// Whether a caller still waits for a reply and its deadline has not passed.
 fn is_waited_for<R>(reply: &oneshot::Sender<R>, deadline: Instant) -> bool {
     !reply.is_closed() && Instant::now() < deadline
 }
 
-impl<T: Send, W: FnOnce(Cancellation<'_>) -> T + Send> Entry for Job<T, W> {
+impl<T: Send, W: FnOnce(Cancellation<'_>) -> T + Send> QueuedJob for Job<T, W> {
     fn is_wanted(&self) -> bool {
         is_waited_for(&self.reply, self.deadline)
     }
 
-    fn entered(&self) -> Instant {
-        self.entered
+    fn queued_at(&self) -> Instant {
+        self.queued_at
     }
 
     fn run(self: Box<Self>, metrics: &PoolMetrics) {
@@ -60,7 +94,7 @@ impl<T: Send, W: FnOnce(Cancellation<'_>) -> T + Send> Entry for Job<T, W> {
             reply,
             deadline,
             span,
-            admission,
+            permit,
             ..
         } = *self;
         let _entered = span.enter();
@@ -71,10 +105,10 @@ impl<T: Send, W: FnOnce(Cancellation<'_>) -> T + Send> Entry for Job<T, W> {
             PoolError::Panicked
         });
         if Instant::now() >= deadline {
-            // The work may have been given up for it: then what it says is not what its caller should hear.
+            // The work may have been cancelled; its refusal must not hide that the deadline passed.
             outcome = Err(PoolError::Expired);
         }
-        drop(admission);
+        drop(permit);
         if reply.send(outcome).is_err() {
             metrics.discarded.increment(1);
             warn!("nobody waited for the result any more");

@@ -1,25 +1,29 @@
-//! The service: settings, HTTP and gRPC doors, worker pool, problem documents, metrics, logs, shutdown.
-//! May use: contract, axum, tonic, tokio, and whatever mends through the port, `darn_contract::port`.
-//! May not live here: geometry, glTF, networks; nothing here blocks an async thread.
+//! The service: HTTP and gRPC in front of any [`Mender`], with settings, a worker pool, sessions, problem documents, metrics, logs
+//! and shutdown.
+//! May use: darn-contract, axum, tonic, tokio.
+//! May not live here: geometry, glTF, networks, anything that blocks an async thread.
 
-mod answer;
+mod accept;
 mod app;
+mod body;
 mod config;
-mod door;
-mod editing;
-mod graves;
+mod connections;
+mod ended_sessions;
+mod error;
 mod grpc;
 mod healthcheck;
-mod intake;
 mod job;
+mod kept_session;
+mod media_types;
 pub mod openapi;
+mod parameters;
 mod pool;
 mod problem;
-mod question;
+mod response;
 mod routes;
 mod schema;
-mod session;
-mod sessions;
+mod session_routes;
+mod session_store;
 mod shutdown;
 mod telemetry;
 
@@ -41,20 +45,18 @@ pub use self::{
     healthcheck::{HealthError, healthcheck},
     telemetry::{LogFormat, start_logging},
 };
-pub use darn_contract::port::{
-    Cancellation, Class, EditSession, Mended, Mender, PatchForm, Patches, Refusal,
-};
+use darn_contract::port::Mender;
 
-/// How often recorded samples are folded into their histograms.
-const UPKEEP: Duration = Duration::from_secs(5);
+/// How often metric samples are aggregated and idle sessions ended.
+const UPKEEP_INTERVAL: Duration = Duration::from_secs(5);
 
 /// Why the service could not start, or ended.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
-    /// An address that cannot be listened on.
+    /// An address cannot be listened on.
     #[error("cannot listen on {address}: {source}")]
     Bind {
-        /// The address, as set.
+        /// The address of the settings.
         address: SocketAddr,
         /// Why not.
         source: io::Error,
@@ -62,46 +64,46 @@ pub enum ServeError {
     /// Threads, signals or sockets failed.
     #[error("the service failed: {0}")]
     Io(#[from] io::Error),
-    /// The warm-up mend failed: no request could succeed.
+    /// The warm-up mend failed, so no request could succeed.
     #[error("the warm-up mend failed: {0}")]
     WarmUp(String),
 }
 
-/// Serves until a signal comes or something breaks; blocks.
+/// Serves until SIGTERM or SIGINT, or until something fails; blocks. Must not be called from an async runtime.
 ///
 /// # Errors
-/// See [`ServeError`].
+/// An address that cannot be bound, a failed warm-up, or an I/O error; see [`ServeError`].
 pub fn run(settings: &ServeArgs, mender: Arc<dyn Mender>) -> Result<(), ServeError> {
     let runtime = runtime::Builder::new_multi_thread().enable_all().build()?;
     let outcome = runtime.block_on(async {
         let sockets = Sockets::bind(settings.listen, settings.grpc_listen).await?;
         let app = App::start(settings, mender)?;
-        let (stop, now) = (CancellationToken::new(), CancellationToken::new());
-        shutdown::on_signal(stop.clone(), now.clone())?;
+        let (stop, abort) = (CancellationToken::new(), CancellationToken::new());
+        shutdown::on_signal(stop.clone(), abort.clone())?;
         tokio::select! {
             outcome = serve(sockets, app, stop, settings.drain) => outcome,
-            () = now.cancelled() => Ok(()),
+            () = abort.cancelled() => Ok(()),
         }
     });
-    // A mend that nobody waits for may still run; the process does not wait for it either.
+    // An abandoned mend may still run; the process does not wait for it.
     runtime.shutdown_background();
     outcome
 }
 
-/// Bound sockets: one for both doors, or one each.
+/// The bound sockets of a service.
 #[derive(Debug)]
 pub struct Sockets {
-    /// HTTP, and gRPC when it has none of its own.
+    /// HTTP, and gRPC unless it has its own.
     pub http: TcpListener,
     /// gRPC alone.
     pub grpc: Option<TcpListener>,
 }
 
 impl Sockets {
-    /// Binds them.
+    /// Binds the addresses; port 0 lets the system choose one.
     ///
     /// # Errors
-    /// `Bind`, naming the address.
+    /// [`ServeError::Bind`], naming the address.
     pub async fn bind(http: SocketAddr, grpc: Option<SocketAddr>) -> Result<Self, ServeError> {
         let listen = async |address| {
             TcpListener::bind(address)
@@ -118,10 +120,10 @@ impl Sockets {
     }
 }
 
-/// Serves on bound sockets until `stop` is cancelled, then drains no longer than `drain`.
+/// Serves on bound sockets until `stop` is cancelled, then waits at most `drain` for the requests under way.
 ///
 /// # Errors
-/// When a socket breaks or the warm-up fails.
+/// An I/O error, or a failed warm-up.
 pub async fn serve(
     sockets: Sockets,
     app: Arc<App>,
@@ -129,19 +131,29 @@ pub async fn serve(
     drain: Duration,
 ) -> Result<(), ServeError> {
     info!(address = %sockets.http.local_addr()?, "listening");
-    let mut doors = tokio::task::JoinSet::new();
+    let mut listeners = tokio::task::JoinSet::new();
     let pause = app.limits.body_pause;
     if let Some(socket) = sockets.grpc {
         info!(address = %socket.local_addr()?, "listening for grpc alone");
-        doors.spawn(door::open(socket, grpc_router(&app), stop.clone(), pause));
-        doors.spawn(door::open(
+        listeners.spawn(connections::serve(
+            socket,
+            grpc_router(&app),
+            stop.clone(),
+            pause,
+        ));
+        listeners.spawn(connections::serve(
             sockets.http,
             http_router(&app),
             stop.clone(),
             pause,
         ));
     } else {
-        doors.spawn(door::open(sockets.http, router(&app), stop.clone(), pause));
+        listeners.spawn(connections::serve(
+            sockets.http,
+            router(&app),
+            stop.clone(),
+            pause,
+        ));
     }
     let upkeep = tokio::spawn(upkeep(Arc::clone(&app)));
     let drained = tokio::spawn({
@@ -158,9 +170,9 @@ pub async fn serve(
             let outcome = app.warm_up().await;
             match &outcome {
                 Ok(()) => info!("ready"),
-                Err(problem::Fault::Draining) => return Ok(()),
-                Err(fault) => {
-                    error!(%fault, "the warm-up mend failed");
+                Err(error::RequestError::Draining) => return Ok(()),
+                Err(error) => {
+                    error!(fault = %error, "the warm-up mend failed");
                     stop.cancel();
                 }
             }
@@ -170,19 +182,19 @@ pub async fn serve(
     let warm_up = tokio::spawn(warm_up);
 
     let serving = async {
-        while let Some(door) = doors.join_next().await {
-            door.map_err(io::Error::other)?;
+        while let Some(listener) = listeners.join_next().await {
+            listener.map_err(io::Error::other)?;
         }
         Ok::<(), io::Error>(())
     };
-    let outcome = shutdown::bounded(serving, &stop, drain).await;
+    let outcome = shutdown::with_bounded_drain(serving, &stop, drain).await;
     let stopped_early = !stop.is_cancelled();
     stop.cancel();
     upkeep.abort();
     drained.abort();
     if warm_up.is_finished() {
-        if let Ok(Err(fault)) = warm_up.await {
-            return Err(ServeError::WarmUp(fault.to_string()));
+        if let Ok(Err(error)) = warm_up.await {
+            return Err(ServeError::WarmUp(error.to_string()));
         }
     } else {
         warm_up.abort();
@@ -192,7 +204,7 @@ pub async fn serve(
     outcome.unwrap_or(Ok(())).map_err(ServeError::Io)
 }
 
-/// Both doors.
+/// The routes of HTTP and gRPC together, as one listener serves them.
 pub fn router(app: &Arc<App>) -> Router {
     routes::finish(routes::routes().merge(grpc_routes(app)), app)
 }
@@ -213,12 +225,14 @@ fn grpc_routes(app: &Arc<App>) -> Router<Arc<App>> {
 }
 
 async fn upkeep(app: Arc<App>) {
-    let mut tick = time::interval(UPKEEP);
+    let mut tick = time::interval(UPKEEP_INTERVAL);
     loop {
         tick.tick().await;
         app.metrics.upkeep();
-        // Freeing a large session takes its time, so not on this thread; nothing depends on when it is done.
+        // Freeing a large session takes long, so it runs on a thread that may block; nothing waits for it.
         let sessions = Arc::clone(&app.sessions);
-        drop(task::spawn_blocking(move || sessions.sweep(Instant::now())));
+        drop(task::spawn_blocking(move || {
+            sessions.end_idle(Instant::now())
+        }));
     }
 }

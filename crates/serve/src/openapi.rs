@@ -1,11 +1,14 @@
-//! The OpenAPI 3.1 document. Paths are written here; the schemas come from the contract's descriptor, so they cannot drift.
-//! `proto/openapi.json` is this document, committed; a test fails when the two differ.
+//! The OpenAPI 3.1 document. Paths are written here; the schemas come from the contract's descriptor, so they match its types.
+//! `proto/openapi.json` is a copy of this document; a test fails when the two differ.
 
 use serde_json::{Map, Value, json};
 
-use super::{problem, schema};
+use super::{
+    media_types::{FORM_DATA, GLB, GLTF, JSON, MULTIPART_MIXED, PROBLEM_JSON, TEXT},
+    schema,
+};
 
-mod editing;
+mod sessions;
 
 /// The document, as served at `/openapi.json`.
 pub fn document() -> Value {
@@ -25,17 +28,17 @@ pub fn document() -> Value {
             "/inpaint": { "post": inpaint() },
             "/holes": { "post": holes() },
             "/optimize-anchor": { "post": optimize_anchor() },
-            "/sessions": { "post": editing::open() },
-            "/sessions/{id}": { "get": editing::describe(), "delete": editing::delete() },
-            "/sessions/{id}/inpaint": { "post": editing::inpaint() },
-            "/sessions/{id}/optimize-anchor": { "post": editing::optimize_anchor() },
-            "/sessions/{id}/result": { "get": editing::result() },
+            "/sessions": { "post": sessions::open() },
+            "/sessions/{id}": { "get": sessions::describe(), "delete": sessions::delete() },
+            "/sessions/{id}/inpaint": { "post": sessions::inpaint() },
+            "/sessions/{id}/optimize-anchor": { "post": sessions::optimize_anchor() },
+            "/sessions/{id}/result": { "get": sessions::result() },
             "/livez": { "get": probe("Whether the process runs", &[]) },
             "/readyz": { "get": probe("Whether the service mends: warmed up and not shutting down", &[503]) },
             "/metrics": { "get": probe("Metrics in Prometheus text format", &[]) },
             "/openapi.json": { "get": {
                 "summary": "This document",
-                "responses": { "200": { "description": "The document", "content": { "application/json": {} } } },
+                "responses": { "200": { "description": "The document", "content": { JSON: {} } } },
             } },
         },
         "components": { "schemas": schemas },
@@ -48,7 +51,8 @@ fn inpaint() -> Value {
         "operationId": "inpaint",
         "requestBody": body(&[("constraints", "Constraints")], &[]),
         "responses": responses(
-            ("200", cloth("The mended scan, in the container of the input", "scan", &["model/gltf-binary", "model/gltf+json"])),
+            "200",
+            mended("The mended scan, in the container of the input", "scan", &[GLB, GLTF]),
             "A scan or constraints that cannot be mended; `errors` names the constraints. With code `no_holes`: the scan has no \
                 hole to fill",
         ),
@@ -57,40 +61,42 @@ fn inpaint() -> Value {
 
 fn optimize_anchor() -> Value {
     let mut found = found();
-    let mended = cloth("", "scan", &["model/gltf-binary", "model/gltf+json"]);
+    let mended = mended("", "scan", &[GLB, GLTF]);
     found["description"] = format!(
         "{}. With `Accept: model/gltf-binary`: the scan mended with that anchor, in the container of the input; with \
             `Accept: multipart/mixed`: the part `report` (application/json, schema Report), then the part `scan`",
         found["description"].as_str().unwrap_or_default()
     )
     .into();
-    for media in ["model/gltf-binary", "model/gltf+json", "multipart/mixed"] {
-        found["content"][media] = mended["content"][media].clone();
+    for media_type in [GLB, GLTF, MULTIPART_MIXED] {
+        found["content"][media_type] = mended["content"][media_type].clone();
     }
     json!({
         "summary": "Find where on a hole's grid a point in space belongs",
         "operationId": "optimizeAnchor",
         "requestBody": body(&[("query", "AnchorQuery")], &["query"]),
         "responses": responses(
-            ("200", found),
+            "200",
+            found,
             "A scan or a query that cannot be searched; `errors` names the fields of the query",
         ),
     })
 }
 
-/// What an anchor search answers.
+/// The answer of an anchor search.
 fn found() -> Value {
     json!({
         "description": "Where the point belongs. In `map` and `mapGradient`, null stands for a cell outside the hole",
-        "content": { "application/json": { "schema": reference("AnchorFound") } },
+        "content": { JSON: { "schema": reference("AnchorFound") } },
     })
 }
 
-/// Cloth in one of some media types, or beside its report.
-fn cloth(description: &str, part: &str, media: &[&str]) -> Value {
-    let mut content = Map::from_iter(media.iter().map(|media| ((*media).to_owned(), json!({}))));
+/// An answer of what was mended: alone in one of some media types, or with its report in multipart/mixed.
+fn mended(description: &str, part: &str, media_types: &[&str]) -> Value {
+    let bare = media_types.iter().map(|it| ((*it).to_owned(), json!({})));
+    let mut content = Map::from_iter(bare);
     content.insert(
-        "multipart/mixed".to_owned(),
+        MULTIPART_MIXED.to_owned(),
         json!({ "schema": { "type": "object", "properties": { "report": reference("Report"), part: {} } } }),
     );
     json!({
@@ -113,17 +119,18 @@ fn cloth(description: &str, part: &str, media: &[&str]) -> Value {
 fn holes() -> Value {
     let found = json!({
         "description": "Every boundary loop of the scan",
-        "content": { "application/json": { "schema": reference("HolesReport") } },
+        "content": { JSON: { "schema": reference("HolesReport") } },
     });
     json!({
         "summary": "Find the boundary loops of a scan, and which of them are holes",
         "operationId": "findHoles",
         "requestBody": body(&[], &[]),
-        "responses": responses(("200", found), "A scan whose holes cannot be found, or constraints, which are not taken here"),
+        "responses": responses("200",
+            found, "A scan whose holes cannot be found, or constraints, which are not taken here"),
     })
 }
 
-/// A scan, alone or with parts beside it, of which some are required: then the scan cannot come alone.
+/// A request body with a scan: alone, or with other parts in multipart/form-data; only as the latter when one of them is required.
 fn body(beside: &[(&str, &str)], required: &[&str]) -> Value {
     let mut parts = json!({ "scan": { "description": "GLB, or glTF with data URIs" } });
     let mut encoding = json!({ "scan": { "contentType": "model/gltf-binary, model/gltf+json, application/octet-stream" } });
@@ -137,15 +144,15 @@ fn body(beside: &[(&str, &str)], required: &[&str]) -> Value {
         "encoding": encoding,
     });
     let content = if required.is_empty() {
-        json!({ "model/gltf-binary": {}, "model/gltf+json": {}, "multipart/form-data": form })
+        json!({ GLB: {}, GLTF: {}, FORM_DATA: form })
     } else {
-        json!({ "multipart/form-data": form })
+        json!({ FORM_DATA: form })
     };
     json!({ "required": true, "content": content })
 }
 
-/// The answers of a route that works: what went well, then every refusal such a route has.
-fn responses((status, success): (&str, Value), unprocessable: &str) -> Value {
+/// The answers of a route that runs a job: its success, then every error such a route has.
+fn responses(status: &str, success: Value, unprocessable: &str) -> Value {
     let mut all = Map::from_iter([(status.to_owned(), success)]);
     for (status, description) in [
         (
@@ -181,7 +188,7 @@ fn probe(summary: &str, refusals: &[u16]) -> Value {
     let mut responses = Map::new();
     responses.insert(
         "200".to_owned(),
-        json!({ "description": summary, "content": { "text/plain": {} } }),
+        json!({ "description": summary, "content": { TEXT: {} } }),
     );
     for status in refusals {
         responses.insert(status.to_string(), refused("Not now; `code` says why"));
@@ -190,7 +197,7 @@ fn probe(summary: &str, refusals: &[u16]) -> Value {
 }
 
 fn refused(description: &str) -> Value {
-    json!({ "description": description, "content": { problem::MEDIA_TYPE: { "schema": reference("Problem") } } })
+    json!({ "description": description, "content": { PROBLEM_JSON: { "schema": reference("Problem") } } })
 }
 
 fn reference(schema: &str) -> Value {

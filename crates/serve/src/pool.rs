@@ -1,7 +1,7 @@
-//! A bounded queue in front of a few blocking worker threads. Knows jobs as closures; knows no HTTP and no scans.
+//! A bounded queue in front of a few blocking worker threads. Runs closures; knows no HTTP and no scans.
 //!
-//! First come, first served, so whoever has a place gets a worker once those before it are done: nobody is overtaken. A job
-//! whose caller went away or whose deadline passed is skipped, or told so while it runs.
+//! Jobs start in the order in which they were queued. A job whose caller left or whose deadline passed is skipped; one that already
+//! runs sees its cancellation.
 
 use std::{
     collections::VecDeque,
@@ -15,49 +15,21 @@ use std::{
 };
 
 use tokio::{
-    sync::{OwnedSemaphorePermit, Semaphore, oneshot},
+    sync::{Semaphore, oneshot},
     time::{Instant, timeout_at},
 };
 use tracing::Span;
 
 use super::{
-    job::{Entry, Job},
+    job::{Job, PoolError, QueuePermit, QueuedJob},
     telemetry::PoolMetrics,
 };
 use darn_contract::port::Cancellation;
 
-/// Longest wait ever suggested, in seconds.
-const LONGEST_RETRY: u64 = 120;
+/// Longest wait suggested to a caller, in seconds.
+const MAX_RETRY_AFTER: u64 = 120;
 
-/// Why a job has no result.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum PoolError {
-    /// Every place is taken.
-    #[error("{waiting} jobs wait and {running} run")]
-    Full {
-        /// Jobs waiting.
-        waiting: usize,
-        /// Jobs running.
-        running: usize,
-        /// Estimated seconds until a place is free, at least 1.
-        retry_after: u64,
-    },
-    /// The pool takes no more jobs.
-    #[error("the pool is closed")]
-    Closed,
-    /// The deadline passed while the job waited or ran.
-    #[error("the deadline passed")]
-    Expired,
-    /// The job panicked.
-    #[error("the job panicked")]
-    Panicked,
-}
-
-/// A place in the queue; free again when dropped.
-#[derive(Debug)]
-pub struct Admission(#[allow(dead_code, reason = "held for its drop")] OwnedSemaphorePermit);
-
-/// The queue and its workers. Dropping it closes it; running jobs end by themselves.
+/// The queue and its workers. Dropping it closes the queue; running jobs run to their end.
 #[derive(Debug)]
 pub struct Pool(Arc<Shared>);
 
@@ -68,21 +40,21 @@ struct Shared {
     places: Arc<Semaphore>,
     workers: usize,
     running: AtomicUsize,
-    /// Moving average of a job's run time, in microseconds; 0 before the first.
-    typical: AtomicU64,
+    /// Moving average of the jobs' run time, in microseconds; 0 before the first.
+    mean_run_time: AtomicU64,
     metrics: PoolMetrics,
 }
 
 #[derive(Default)]
 struct Queue {
-    entries: VecDeque<Box<dyn Entry>>,
+    jobs: VecDeque<Box<dyn QueuedJob>>,
     closed: bool,
 }
 
 impl std::fmt::Debug for Queue {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Queue")
-            .field("entries", &self.entries.len())
+            .field("jobs", &self.jobs.len())
             .field("closed", &self.closed)
             .finish()
     }
@@ -101,7 +73,7 @@ impl Pool {
             places: Arc::new(Semaphore::new(workers + queue)),
             workers,
             running: AtomicUsize::new(0),
-            typical: AtomicU64::new(0),
+            mean_run_time: AtomicU64::new(0),
             metrics,
         });
         let pool = Self(Arc::clone(&shared));
@@ -109,21 +81,21 @@ impl Pool {
             let shared = Arc::clone(&shared);
             thread::Builder::new()
                 .name(format!("mend-{index}"))
-                .spawn(move || shared.work())?;
+                .spawn(move || shared.run_jobs())?;
         }
         Ok(pool)
     }
 
-    /// Whether a place is free now; takes none.
+    /// Checks that a place is free now; takes none.
     ///
     /// # Errors
     /// `Full` with an estimate, or `Closed`.
-    pub fn room(&self) -> Result<(), PoolError> {
+    pub fn check_capacity(&self) -> Result<(), PoolError> {
         if self.0.lock().closed {
             return Err(PoolError::Closed);
         }
         if self.0.places.available_permits() == 0 {
-            self.0.sweep();
+            self.0.drop_abandoned();
         }
         match self.0.places.available_permits() {
             0 => Err(self.0.full()),
@@ -131,32 +103,32 @@ impl Pool {
         }
     }
 
-    /// Takes a place, for a job that is about to be run.
+    /// Takes a place for a job.
     ///
     /// # Errors
     /// `Full` with an estimate, or `Closed`.
-    pub fn admit(&self) -> Result<Admission, PoolError> {
+    pub fn reserve(&self) -> Result<QueuePermit, PoolError> {
         if self.0.lock().closed {
             return Err(PoolError::Closed);
         }
         let take = || Arc::clone(&self.0.places).try_acquire_owned();
         take()
             .or_else(|_| {
-                self.0.sweep();
+                self.0.drop_abandoned();
                 take()
             })
-            .map(Admission)
+            .map(QueuePermit::new)
             .map_err(|_| self.0.full())
     }
 
-    /// Puts a job into the queue at once; the future waits for its result, until the deadline. Dropping it skips the job if it
-    /// has not begun, and tells it that nobody waits if it has.
+    /// Queues a job at once; the future waits for its result, until the deadline. Dropping the future skips a job that has not begun,
+    /// and cancels one that has.
     ///
     /// # Errors
     /// `Closed`, `Expired` or `Panicked`.
     pub fn run<T: Send + 'static>(
         &self,
-        admission: Admission,
+        permit: QueuePermit,
         deadline: Instant,
         work: impl FnOnce(Cancellation<'_>) -> T + Send + 'static,
     ) -> impl Future<Output = Result<T, PoolError>> {
@@ -165,9 +137,9 @@ impl Pool {
             work,
             reply,
             deadline,
-            entered: Instant::now(),
+            queued_at: Instant::now(),
             span: Span::current(),
-            admission,
+            permit,
         }));
         async move {
             pushed?;
@@ -178,7 +150,7 @@ impl Pool {
         }
     }
 
-    /// Takes no more jobs; those that wait still run.
+    /// Refuses further jobs; those in the queue still run.
     pub fn close(&self) {
         self.0.lock().closed = true;
         self.0.filled.notify_all();
@@ -193,52 +165,54 @@ impl Drop for Pool {
 
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, Queue> {
-        // No foreign code runs under the lock, so a poisoned one is still whole.
+        // Nothing under the lock panics halfway through a change, so a poisoned state is still consistent.
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn push(&self, entry: Box<dyn Entry>) -> Result<(), PoolError> {
+    fn push(&self, job: Box<dyn QueuedJob>) -> Result<(), PoolError> {
         let mut queue = self.lock();
         if queue.closed {
             return Err(PoolError::Closed);
         }
-        queue.entries.push_back(entry);
-        self.metrics.waiting.set(queue.entries.len() as f64);
+        queue.jobs.push_back(job);
+        self.metrics.waiting.set(queue.jobs.len() as f64);
         drop(queue);
         self.filled.notify_one();
         Ok(())
     }
 
-    /// Drops entries nobody waits for any more.
-    fn sweep(&self) {
+    /// Drops jobs nobody waits for any more.
+    fn drop_abandoned(&self) {
         let mut queue = self.lock();
-        let (kept, stale): (VecDeque<_>, VecDeque<_>) = std::mem::take(&mut queue.entries)
+        let (kept, abandoned): (VecDeque<_>, VecDeque<_>) = std::mem::take(&mut queue.jobs)
             .into_iter()
-            .partition(|entry| entry.is_wanted());
-        queue.entries = kept;
-        self.metrics.waiting.set(queue.entries.len() as f64);
+            .partition(|job| job.is_wanted());
+        queue.jobs = kept;
+        self.metrics.waiting.set(queue.jobs.len() as f64);
         drop(queue);
-        self.metrics.skipped.increment(stale.len() as u64);
+        self.metrics.skipped.increment(abandoned.len() as u64);
     }
 
+    /// The error of a full queue, with an estimate of when a place is free.
     fn full(&self) -> PoolError {
-        let waiting = self.lock().entries.len();
+        let waiting = self.lock().jobs.len();
         let running = self.running.load(Relaxed);
-        let typical = Duration::from_micros(self.typical.load(Relaxed)).as_secs_f64();
-        let until_free = typical * (waiting + 1) as f64 / self.workers as f64;
+        let mean_run_time = Duration::from_micros(self.mean_run_time.load(Relaxed)).as_secs_f64();
+        let until_free = mean_run_time * (waiting + 1) as f64 / self.workers as f64;
         PoolError::Full {
             waiting,
             running,
-            retry_after: (until_free.ceil() as u64).clamp(1, LONGEST_RETRY),
+            retry_after: (until_free.ceil() as u64).clamp(1, MAX_RETRY_AFTER),
         }
     }
 
-    fn next(&self) -> Option<Box<dyn Entry>> {
+    /// Waits for the next job; `None` once the queue is closed and empty.
+    fn next(&self) -> Option<Box<dyn QueuedJob>> {
         let mut queue = self.lock();
         loop {
-            if let Some(entry) = queue.entries.pop_front() {
-                self.metrics.waiting.set(queue.entries.len() as f64);
-                return Some(entry);
+            if let Some(job) = queue.jobs.pop_front() {
+                self.metrics.waiting.set(queue.jobs.len() as f64);
+                return Some(job);
             }
             if queue.closed {
                 return None;
@@ -250,9 +224,10 @@ impl Shared {
         }
     }
 
-    fn work(&self) {
-        while let Some(entry) = self.next() {
-            if !entry.is_wanted() {
+    /// A worker thread: runs jobs until the queue is closed and empty.
+    fn run_jobs(&self) {
+        while let Some(job) = self.next() {
+            if !job.is_wanted() {
                 self.metrics.skipped.increment(1);
                 continue;
             }
@@ -262,24 +237,24 @@ impl Shared {
             let begun = Instant::now();
             self.metrics
                 .waited
-                .record(begun.duration_since(entry.entered()).as_secs_f64());
-            entry.run(&self.metrics);
-            self.learn(begun.elapsed());
+                .record(begun.duration_since(job.queued_at()).as_secs_f64());
+            job.run(&self.metrics);
+            self.record_run_time(begun.elapsed());
             self.metrics
                 .running
                 .set((self.running.fetch_sub(1, Relaxed) - 1) as f64);
         }
     }
 
-    fn learn(&self, took: Duration) {
+    fn record_run_time(&self, took: Duration) {
         let took = u64::try_from(took.as_micros()).unwrap_or(u64::MAX).max(1);
-        let old = self.typical.load(Relaxed);
+        let old = self.mean_run_time.load(Relaxed);
         let new = if old == 0 {
             took
         } else {
             old - old / 8 + took / 8
         };
-        self.typical.store(new.max(1), Relaxed);
+        self.mean_run_time.store(new.max(1), Relaxed);
     }
 }
 

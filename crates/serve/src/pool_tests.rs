@@ -1,18 +1,19 @@
-//! Laws of the pool.
+//! Tests of the pool: order, limits, deadlines, cancellation, panics.
 
 use std::sync::mpsc;
 
 use super::*;
+use crate::telemetry::Metrics;
 
 fn pool(workers: usize, queue: usize) -> Pool {
-    Pool::start(workers, queue, PoolMetrics::unwatched()).unwrap()
+    Pool::start(workers, queue, Metrics::new().unwrap().pool()).unwrap()
 }
 
 fn soon() -> Instant {
     Instant::now() + Duration::from_secs(20)
 }
 
-/// A job that runs until told, and tells when it has begun.
+/// A job that reports when it has begun, and runs until it is released.
 fn held() -> (
     impl FnOnce(Cancellation<'_>) + Send + 'static,
     mpsc::Receiver<()>,
@@ -28,10 +29,10 @@ fn held() -> (
 }
 
 #[tokio::test]
-async fn a_full_pool_says_so_and_frees_places_of_those_who_left() {
+async fn a_full_pool_refuses_and_frees_the_places_of_callers_who_left() {
     let pool = Arc::new(pool(1, 1));
     let (work, begun, release) = held();
-    let first = pool.admit().unwrap();
+    let first = pool.reserve().unwrap();
     let running = tokio::spawn({
         let pool = Arc::clone(&pool);
         async move { pool.run(first, soon(), work).await }
@@ -41,11 +42,11 @@ async fn a_full_pool_says_so_and_frees_places_of_those_who_left() {
         .unwrap()
         .unwrap();
 
-    let second = pool.admit().unwrap();
+    let second = pool.reserve().unwrap();
     let mut waiting = Box::pin(pool.run(second, soon(), |_| panic!("must be skipped")));
-    assert!(futures_poll(&mut waiting).await.is_none());
+    assert!(poll_once(&mut waiting).await.is_none());
     assert_eq!(
-        pool.admit().unwrap_err(),
+        pool.reserve().unwrap_err(),
         PoolError::Full {
             waiting: 1,
             running: 1,
@@ -54,18 +55,18 @@ async fn a_full_pool_says_so_and_frees_places_of_those_who_left() {
     );
 
     drop(waiting);
-    let third = pool.admit().unwrap();
+    let third = pool.reserve().unwrap();
     release.send(()).unwrap();
     assert_eq!(running.await.unwrap(), Ok(()));
     assert_eq!(pool.run(third, soon(), |_| 7).await, Ok(7));
 }
 
 #[tokio::test]
-async fn who_came_first_is_served_first() {
+async fn jobs_start_in_the_order_they_were_queued() {
     let pool = pool(1, 8);
     let (work, begun, release) = held();
-    let mut first = Box::pin(pool.run(pool.admit().unwrap(), soon(), work));
-    assert!(futures_poll(&mut first).await.is_none());
+    let mut first = Box::pin(pool.run(pool.reserve().unwrap(), soon(), work));
+    assert!(poll_once(&mut first).await.is_none());
     tokio::task::spawn_blocking(move || begun.recv())
         .await
         .unwrap()
@@ -75,11 +76,11 @@ async fn who_came_first_is_served_first() {
         .map(|i| {
             let order = Arc::clone(&order);
             let work = move |_: Cancellation<'_>| order.lock().unwrap().push(i);
-            pool.run(pool.admit().unwrap(), soon(), work)
+            pool.run(pool.reserve().unwrap(), soon(), work)
         })
         .collect();
     release.send(()).unwrap();
-    // Asked for in the other order, run in that of coming.
+    // Awaited in the opposite order.
     for job in waiting.into_iter().rev() {
         assert_eq!(job.await, Ok(()));
     }
@@ -91,11 +92,11 @@ async fn who_came_first_is_served_first() {
 async fn a_deadline_covers_waiting_and_running() {
     let pool = Arc::new(pool(1, 4));
     let (work, begun, release) = held();
-    let admission = pool.admit().unwrap();
+    let permit = pool.reserve().unwrap();
     let running = tokio::spawn({
         let pool = Arc::clone(&pool);
         async move {
-            pool.run(admission, Instant::now() + Duration::from_millis(200), work)
+            pool.run(permit, Instant::now() + Duration::from_millis(200), work)
                 .await
         }
     });
@@ -106,7 +107,7 @@ async fn a_deadline_covers_waiting_and_running() {
     let (tell, told) = mpsc::channel();
     let waiting = pool
         .run(
-            pool.admit().unwrap(),
+            pool.reserve().unwrap(),
             Instant::now() + Duration::from_millis(10),
             move |_| {
                 tell.send(()).ok();
@@ -116,14 +117,17 @@ async fn a_deadline_covers_waiting_and_running() {
     assert_eq!(waiting, Err(PoolError::Expired));
     assert_eq!(running.await.unwrap(), Err(PoolError::Expired));
     release.send(()).unwrap();
-    assert_eq!(pool.run(pool.admit().unwrap(), soon(), |_| 1).await, Ok(1));
+    assert_eq!(
+        pool.run(pool.reserve().unwrap(), soon(), |_| 1).await,
+        Ok(1)
+    );
     assert!(told.try_recv().is_err(), "an expired job must not run");
 }
 
 #[tokio::test]
-async fn a_running_job_learns_that_nobody_waits() {
+async fn a_running_job_is_cancelled_when_nobody_waits() {
     let pool = pool(1, 4);
-    let (told, hears) = mpsc::channel();
+    let (told, events) = mpsc::channel();
     let working = |told: mpsc::Sender<bool>| {
         move |cancellation: Cancellation<'_>| {
             told.send(!cancellation.is_cancelled()).ok();
@@ -133,36 +137,42 @@ async fn a_running_job_learns_that_nobody_waits() {
             told.send(false).ok();
         }
     };
-    let mut leaving = Box::pin(pool.run(pool.admit().unwrap(), soon(), working(told.clone())));
-    assert!(futures_poll(&mut leaving).await.is_none());
-    let hears = tokio::task::spawn_blocking(move || {
-        assert_eq!(hears.recv(), Ok(true));
-        hears
+    let mut leaving = Box::pin(pool.run(pool.reserve().unwrap(), soon(), working(told.clone())));
+    assert!(poll_once(&mut leaving).await.is_none());
+    let events = tokio::task::spawn_blocking(move || {
+        assert_eq!(events.recv(), Ok(true));
+        events
     });
-    let hears = hears.await.unwrap();
+    let events = events.await.unwrap();
     drop(leaving);
-    // Its worker is free again, for one whose time is up before it would end by itself.
+    // Its worker is free again. The next job ends because its deadline passes.
     let deadline = Instant::now() + Duration::from_millis(100);
-    let late = pool.run(pool.admit().unwrap(), deadline, working(told));
+    let late = pool.run(pool.reserve().unwrap(), deadline, working(told));
     assert_eq!(late.await, Err(PoolError::Expired));
-    assert_eq!(pool.run(pool.admit().unwrap(), soon(), |_| 4).await, Ok(4));
-    assert_eq!(hears.iter().collect::<Vec<_>>(), [false, true, false]);
+    assert_eq!(
+        pool.run(pool.reserve().unwrap(), soon(), |_| 4).await,
+        Ok(4)
+    );
+    assert_eq!(events.iter().collect::<Vec<_>>(), [false, true, false]);
 }
 
 #[tokio::test]
-async fn a_panic_is_its_own_jobs_error_and_a_closed_pool_finishes_what_it_took() {
+async fn a_panic_fails_only_its_job_and_a_closed_pool_finishes_queued_jobs() {
     let pool = pool(1, 4);
     let panicked = pool
-        .run(pool.admit().unwrap(), soon(), |_| panic!("on purpose"))
+        .run(pool.reserve().unwrap(), soon(), |_| panic!("on purpose"))
         .await;
     assert_eq!(panicked, Err::<(), _>(PoolError::Panicked));
-    assert_eq!(pool.run(pool.admit().unwrap(), soon(), |_| 2).await, Ok(2));
+    assert_eq!(
+        pool.run(pool.reserve().unwrap(), soon(), |_| 2).await,
+        Ok(2)
+    );
 
-    let last = pool.admit().unwrap();
+    let last = pool.reserve().unwrap();
     let mut job = Box::pin(pool.run(last, soon(), |_| 3));
-    let early = futures_poll(&mut job).await;
+    let early = poll_once(&mut job).await;
     pool.close();
-    assert_eq!(pool.admit().unwrap_err(), PoolError::Closed);
+    assert_eq!(pool.reserve().unwrap_err(), PoolError::Closed);
     let outcome = match early {
         Some(outcome) => outcome,
         None => job.await,
@@ -171,7 +181,7 @@ async fn a_panic_is_its_own_jobs_error_and_a_closed_pool_finishes_what_it_took()
 }
 
 /// Polls a future once.
-async fn futures_poll<F: Future + Unpin>(future: &mut F) -> Option<F::Output> {
+async fn poll_once<F: Future + Unpin>(future: &mut F) -> Option<F::Output> {
     std::future::poll_fn(|cx| {
         std::task::Poll::Ready(match std::pin::Pin::new(&mut *future).poll(cx) {
             std::task::Poll::Ready(output) => Some(output),

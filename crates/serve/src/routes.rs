@@ -1,4 +1,4 @@
-//! The HTTP door: paths, what they take and what they answer.
+//! The HTTP routes of a scan sent with each request, the probes, and the layers around all routes.
 
 use std::{sync::Arc, time::Instant};
 
@@ -18,37 +18,40 @@ use tower_http::{
 use tracing::{Instrument as _, info, info_span};
 
 use super::{
-    answer::{self, ANCHOR_DISTANCE, Cloth, GLB, GLTF, HOLES_FILLED, JSON, LOOPS_SKIPPED, PARTS},
+    accept::preferred,
     app::App,
-    editing,
-    intake::{self, Asked},
+    body::{self, ScanRequest},
+    error::RequestError,
+    media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, PROMETHEUS},
     openapi,
-    problem::Fault,
-    question::Question,
+    response::{self, ANCHOR_DISTANCE, HOLES_FILLED, LOOPS_SKIPPED, MendResponse},
+    session_routes,
     telemetry::{REQUEST_ID, RequestId},
 };
 use darn_contract::{Constraints, Search};
 
-/// The HTTP routes; `finish` turns them into a service.
+/// All HTTP routes; [`finish`] makes them a service.
 pub fn routes() -> Router<Arc<App>> {
     Router::new()
         .route("/inpaint", post(inpaint))
         .route("/holes", post(holes))
         .route("/optimize-anchor", post(optimize_anchor))
-        .merge(editing::routes())
+        .merge(session_routes::routes())
         .route("/livez", get(|| async { "alive\n" }))
         .route("/readyz", get(readyz))
         .route("/metrics", get(metrics))
         .route("/openapi.json", get(|| async { Json(openapi::document()) }))
-        .fallback(|| async { Fault::NotFound })
-        .method_not_allowed_fallback(|| async { Fault::MethodNotAllowed })
+        .fallback(|| async { RequestError::NotFound })
+        .method_not_allowed_fallback(|| async { RequestError::MethodNotAllowed })
 }
 
-/// Puts the layers around all routes of a listener: panics, request ids, problem documents, counts, web origins.
+/// Adds the layers around all routes of a listener: panics, request ids, problem documents, metrics, CORS.
 pub fn finish(routes: Router<Arc<App>>, app: &Arc<App>) -> Router {
     routes
-        .layer(CatchPanicLayer::custom(|_| Fault::Internal.into_response()))
-        .layer(middleware::from_fn_with_state(Arc::clone(app), around))
+        .layer(CatchPanicLayer::custom(|_| {
+            RequestError::Internal.into_response()
+        }))
+        .layer(middleware::from_fn_with_state(Arc::clone(app), observe))
         .layer(cors(&app.allow_origin))
         .with_state(Arc::clone(app))
 }
@@ -82,8 +85,9 @@ fn cors(origins: &[String]) -> CorsLayer {
         ])
 }
 
-async fn around(State(app): State<Arc<App>>, mut request: Request, next: Next) -> Response {
-    let begun = Instant::now();
+/// Gives a request its id and log span, renders its error, and records its metrics.
+async fn observe(State(app): State<Arc<App>>, mut request: Request, next: Next) -> Response {
+    let started = Instant::now();
     let id = RequestId::of(request.headers());
     let route = request
         .extensions()
@@ -94,102 +98,91 @@ async fn around(State(app): State<Arc<App>>, mut request: Request, next: Next) -
     request.extensions_mut().insert(id.clone());
 
     let mut response = next.run(request).instrument(span.clone()).await;
-    let fault = response.extensions_mut().remove::<Fault>();
-    if let Some(fault) = &fault {
-        response = fault.render(&id.0, std::mem::take(response.headers_mut()));
+    let error = response.extensions_mut().remove::<RequestError>();
+    if let Some(error) = &error {
+        response = error.render(&id.0, std::mem::take(response.headers_mut()));
     }
     if let Ok(value) = HeaderValue::from_str(&id.0) {
         response.headers_mut().insert(REQUEST_ID, value);
     }
 
     let status = response.status().as_u16();
-    app.metrics.answered(&route, status, begun.elapsed());
-    let code = fault.as_ref().map(Fault::code);
+    app.metrics.answered(&route, status, started.elapsed());
+    let code = error.as_ref().map(|error| error.code().word);
     span.in_scope(|| {
         info!(
             status,
             code,
-            ms = begun.elapsed().as_secs_f64() * 1000.0,
+            ms = started.elapsed().as_secs_f64() * 1000.0,
             "answered"
         )
     });
     response
 }
 
-async fn inpaint(State(app): State<Arc<App>>, request: Request) -> Result<Response, Fault> {
-    let wanted = answer::preferred(request.headers(), &[GLB, GLTF, PARTS]);
-    let Asked {
+async fn inpaint(State(app): State<Arc<App>>, request: Request) -> Result<Response, RequestError> {
+    let media_type = preferred(request.headers(), &[GLB, GLTF, MULTIPART_MIXED]);
+    let ScanRequest {
         scan,
-        question,
+        parameters,
         upload,
-    } = admitted::<Constraints>(&app, request).await?;
-    let asked = question.unwrap_or_default();
+    } = body::receive_scan::<Constraints>(&app, request).await?;
+    let constraints = parameters.unwrap_or_default();
     let mended = app
         .submit(upload, move |mender, cancellation| {
-            mender.inpaint(&scan, &asked, cancellation)
+            mender.inpaint(scan, &constraints, cancellation)
         })
         .await?;
     app.metrics.mended(&mended.report);
-    Ok(Cloth::from(mended).response(wanted))
+    Ok(MendResponse::from(mended).render(media_type))
 }
 
-async fn holes(State(app): State<Arc<App>>, request: Request) -> Result<Response, Fault> {
-    let Asked { scan, upload, .. } = admitted(&app, request).await?.unconstrained()?;
+async fn holes(State(app): State<Arc<App>>, request: Request) -> Result<Response, RequestError> {
+    let received = body::receive_scan(&app, request).await?;
+    let ScanRequest { scan, upload, .. } = received.without_constraints()?;
     let report = app
-        .submit(upload, move |mender, _| mender.find_holes(&scan))
+        .submit(upload, move |mender, _| mender.find_holes(scan))
         .await?;
     Ok(Json(report).into_response())
 }
 
-async fn optimize_anchor(State(app): State<Arc<App>>, request: Request) -> Result<Response, Fault> {
-    let wanted = answer::preferred(request.headers(), &[JSON, GLB, GLTF, PARTS]);
-    let Asked {
+async fn optimize_anchor(
+    State(app): State<Arc<App>>,
+    request: Request,
+) -> Result<Response, RequestError> {
+    let media_type = preferred(request.headers(), &[JSON, GLB, GLTF, MULTIPART_MIXED]);
+    let ScanRequest {
         scan,
-        question,
+        parameters,
         upload,
-    } = admitted::<Search>(&app, request).await?;
+    } = body::receive_scan::<Search>(&app, request).await?;
     let place = "the part `query` of multipart/form-data, beside the part `scan`";
-    let search = question.ok_or(Fault::NoQuery { place })?;
-    if wanted == JSON {
+    let search = parameters.ok_or(RequestError::NoQuery { place })?;
+    if media_type == JSON {
         let text = app
             .submit(upload, move |mender, cancellation| {
-                let found = mender.optimize_anchor(&scan, &search, cancellation)?;
-                Ok(answer::json(&found))
+                let found = mender.optimize_anchor(scan, &search, cancellation)?;
+                Ok(response::json(&found))
             })
             .await?;
-        return Ok(answer::json_response(text));
+        return Ok(response::json_response(text));
     }
     let mended = app
         .submit(upload, move |mender, cancellation| {
-            mender.mend_to_target(&scan, &search, cancellation)
+            mender.mend_to_target(scan, &search, cancellation)
         })
         .await?;
     app.metrics.mended(&mended.report);
-    Ok(Cloth::from(mended).response(wanted))
+    Ok(MendResponse::from(mended).render(media_type))
 }
 
-/// A scan and what is asked of it; its body is read only when there is room for the job.
-pub(super) async fn admitted<Q: Question>(app: &App, request: Request) -> Result<Asked<Q>, Fault> {
-    match app.upload() {
-        Ok(upload) => intake::asked(request, upload, &app.limits).await,
-        Err(fault) => {
-            let (parts, body) = request.into_parts();
-            intake::refuse(&parts.headers, body, &app.limits);
-            Err(fault)
-        }
-    }
-}
-
-async fn readyz(State(app): State<Arc<App>>) -> Result<&'static str, Fault> {
+async fn readyz(State(app): State<Arc<App>>) -> Result<&'static str, RequestError> {
     app.ready().map(|()| "ready\n")
 }
 
 async fn metrics(State(app): State<Arc<App>>) -> impl IntoResponse {
-    // So that no session is counted whose time is over.
+    // The gauges must not count sessions that were idle for too long.
     let sessions = Arc::clone(&app.sessions);
-    (task::spawn_blocking(move || sessions.sweep(Instant::now())).await).ok();
-    (
-        [(header::CONTENT_TYPE, "text/plain; version=0.0.4")],
-        app.metrics.render(),
-    )
+    (task::spawn_blocking(move || sessions.end_idle(Instant::now())).await).ok();
+    ([(header::CONTENT_TYPE, PROMETHEUS)], app.metrics.render())
 }

@@ -1,4 +1,4 @@
-//! JSON schemas of the contract's messages, read off the descriptor their types were generated from.
+//! JSON schemas of the contract's messages, from the descriptor that their Rust types were generated from.
 
 use prost::Message as _;
 use prost_types::{
@@ -11,16 +11,16 @@ use serde_json::{Map, Value, json};
 use darn_contract::v1;
 
 const PACKAGE: &str = "darn.v1";
-/// Fields with numbers that may not be numbers; JSON has null for those.
-const HAS_GAPS: [&str; 2] = ["map", "map_gradient"];
-/// Places in a `FileDescriptorProto`, by field number: its messages, its enums, and a message's fields.
+/// Fields whose numbers may be NaN, which is null in JSON.
+const MAY_BE_NAN: [&str; 2] = ["map", "map_gradient"];
+/// Field numbers in descriptor.proto, as paths of comments use them: messages and enums of a file, fields of a message.
 const MESSAGES: i32 = 4;
 const ENUMS: i32 = 5;
 const FIELDS: i32 = 2;
 
-/// One schema a message or enum, by its name, in the order of the file. A message that takes part only in gRPC is left out.
+/// A schema for each message and enum, by name, in the order of the file; without the messages that only gRPC uses.
 pub(super) fn schemas() -> Map<String, Value> {
-    // Our own build wrote the descriptor; if it could not be read, the committed document would tell.
+    // The build wrote the descriptor; if it were unreadable, the test of the committed document would fail.
     let set = FileDescriptorSet::decode(v1::DESCRIPTORS).unwrap_or_default();
     let Some(file) = set.file.iter().find(|file| file.package() == PACKAGE) else {
         return Map::new();
@@ -32,7 +32,7 @@ pub(super) fn schemas() -> Map<String, Value> {
         messages.map(|(i, message)| (message.name().to_owned(), object(file, i, message)));
     let enums = (0..)
         .zip(&file.enum_type)
-        .map(|(i, e)| (e.name().to_owned(), words(file, i, e)));
+        .map(|(i, e)| (e.name().to_owned(), enumeration(file, i, e)));
     messages.chain(enums).collect()
 }
 
@@ -56,14 +56,14 @@ fn object(file: &FileDescriptorProto, index: i32, message: &DescriptorProto) -> 
     })
 }
 
-fn words(file: &FileDescriptorProto, index: i32, e: &EnumDescriptorProto) -> Value {
+fn enumeration(file: &FileDescriptorProto, index: i32, e: &EnumDescriptorProto) -> Value {
     let values: Vec<&str> = e.value.iter().map(|value| value.name()).collect();
     json!({ "type": "string", "description": comment(file, &[ENUMS, index]), "enum": values })
 }
 
 fn property(field: &FieldDescriptorProto) -> Value {
     let one = match field.r#type() {
-        Type::Double if HAS_GAPS.contains(&field.name()) => json!({ "type": ["number", "null"] }),
+        Type::Double if MAY_BE_NAN.contains(&field.name()) => json!({ "type": ["number", "null"] }),
         Type::Double | Type::Float => json!({ "type": "number" }),
         Type::Bool => json!({ "type": "boolean" }),
         Type::Uint32 | Type::Fixed32 => json!({ "type": "integer", "minimum": 0 }),

@@ -1,4 +1,4 @@
-//! The end of the service: a signal, a drain, a bound.
+//! Shutdown: signals, and a drain of bounded length.
 
 use std::{io, time::Duration};
 
@@ -10,11 +10,11 @@ use tokio::{
 use tokio_util::sync::CancellationToken;
 use tracing::{info, warn};
 
-/// Cancels `stop` at the first SIGTERM or SIGINT, and `now` at the second: whoever asks twice does not want to wait.
+/// Cancels `stop` at the first SIGTERM or SIGINT, and `abort`, which ends the drain, at the second.
 ///
 /// # Errors
-/// When the signals cannot be listened to.
-pub fn on_signal(stop: CancellationToken, now: CancellationToken) -> io::Result<()> {
+/// The signal handlers cannot be installed.
+pub fn on_signal(stop: CancellationToken, abort: CancellationToken) -> io::Result<()> {
     let mut terminate = signal(SignalKind::terminate())?;
     let mut interrupt = signal(SignalKind::interrupt())?;
     tokio::spawn(async move {
@@ -29,13 +29,13 @@ pub fn on_signal(stop: CancellationToken, now: CancellationToken) -> io::Result<
         stop.cancel();
         let signal = next().await;
         warn!(signal, "ending at once");
-        now.cancel();
+        abort.cancel();
     });
     Ok(())
 }
 
-/// Waits for `serving`, but once `stop` is cancelled no longer than `drain`; `None` when the drain was cut short.
-pub async fn bounded<T>(
+/// Waits for `serving`, at most `drain` once `stop` is cancelled; `None` when that time was over.
+pub async fn with_bounded_drain<T>(
     serving: impl Future<Output = T>,
     stop: &CancellationToken,
     drain: Duration,
@@ -60,17 +60,17 @@ mod tests {
     use super::*;
 
     #[tokio::test]
-    async fn a_drain_ends_when_the_work_does_or_when_time_is_up() {
+    async fn a_drain_ends_with_the_work_or_after_its_time() {
         let stop = CancellationToken::new();
         stop.cancel();
         let short = Duration::from_millis(20);
-        assert_eq!(bounded(async { 1 }, &stop, short).await, Some(1));
+        assert_eq!(with_bounded_drain(async { 1 }, &stop, short).await, Some(1));
         assert_eq!(
-            bounded(std::future::pending::<()>(), &stop, short).await,
+            with_bounded_drain(std::future::pending::<()>(), &stop, short).await,
             None
         );
         assert_eq!(
-            bounded(async { 2 }, &CancellationToken::new(), short).await,
+            with_bounded_drain(async { 2 }, &CancellationToken::new(), short).await,
             Some(2)
         );
     }

@@ -1,4 +1,4 @@
-//! Logs, request ids and metrics. Labels are few and fixed: never an id, never a path a caller made up.
+//! Logs, request ids and metrics. Metric labels come from a small fixed set: never an id or a caller's path.
 
 use std::{io::IsTerminal, panic, time::Duration};
 
@@ -14,17 +14,17 @@ use uuid::Uuid;
 
 use darn_contract::v1;
 
-/// The header that carries a request's id, both ways.
+/// The header that carries a request's id, in requests and answers.
 pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
-/// A request's id, in its extensions.
+/// A request's id, as a request extension.
 #[derive(Debug, Clone)]
 pub struct RequestId(pub String);
 
 impl RequestId {
-    /// The caller's own id when it is short and plain, else a new one.
+    /// The caller's id if it has at most 128 letters, digits, `-`, `_` or `.`; else a new one.
     pub fn of(headers: &HeaderMap) -> Self {
-        let plain = |id: &&str| {
+        let is_plain = |id: &&str| {
             (1..=128).contains(&id.len())
                 && id
                     .bytes()
@@ -32,7 +32,7 @@ impl RequestId {
         };
         (headers.get(REQUEST_ID))
             .and_then(|value| value.to_str().ok())
-            .filter(plain)
+            .filter(is_plain)
             .map_or_else(
                 || Self(Uuid::new_v4().to_string()),
                 |id| Self(id.to_owned()),
@@ -49,10 +49,10 @@ pub enum LogFormat {
     Json,
 }
 
-/// Starts logging to standard error, once; a panic becomes a log line.
+/// Starts logging to standard error and logs panics. A second call does nothing.
 ///
 /// # Errors
-/// A filter that does not parse.
+/// The filter does not parse.
 pub fn start_logging(filter: &str, format: LogFormat) -> Result<(), String> {
     let filter = EnvFilter::try_new(filter).map_err(|error| error.to_string())?;
     let lines = tracing_subscriber::fmt()
@@ -67,7 +67,7 @@ pub fn start_logging(filter: &str, format: LogFormat) -> Result<(), String> {
             .with_span_list(false)
             .try_init(),
     };
-    // Somebody else's subscriber, in a test or an embedding program, is as good.
+    // It fails when a test or an embedding program has already set a subscriber, which is kept.
     if started.is_ok() {
         panic::set_hook(Box::new(|info| {
             let message = info.payload_as_str().unwrap_or("no message");
@@ -78,7 +78,7 @@ pub fn start_logging(filter: &str, format: LogFormat) -> Result<(), String> {
     Ok(())
 }
 
-/// What the worker pool counts.
+/// The metrics of the worker pool.
 #[derive(Debug)]
 pub struct PoolMetrics {
     /// Jobs waiting.
@@ -87,63 +87,34 @@ pub struct PoolMetrics {
     pub running: Gauge,
     /// Seconds a job waited.
     pub waited: Histogram,
-    /// Jobs dropped before they began: the caller left or the deadline passed.
+    /// Jobs dropped before they began, because the caller left or the deadline passed.
     pub skipped: Counter,
-    /// Jobs whose result nobody took.
+    /// Jobs whose caller left before the result.
     pub discarded: Counter,
     /// Jobs that panicked.
     pub panicked: Counter,
 }
 
-impl PoolMetrics {
-    /// Counts nothing.
-    pub fn unwatched() -> Self {
-        Self {
-            waiting: Gauge::noop(),
-            running: Gauge::noop(),
-            waited: Histogram::noop(),
-            skipped: Counter::noop(),
-            discarded: Counter::noop(),
-            panicked: Counter::noop(),
-        }
-    }
-}
-
-/// What the kept sessions count.
+/// The metrics of the sessions.
 #[derive(Debug)]
 pub struct SessionMetrics {
     /// Sessions open.
     pub open: Gauge,
-    /// Bytes they take.
+    /// Bytes they take together.
     pub bytes: Gauge,
-    /// Requests that use one or wait for their turn.
+    /// Requests that use a session or wait for it.
     pub requests: Gauge,
-    /// Sessions ever opened.
+    /// Sessions opened.
     pub opened: Counter,
-    /// Ended by idleness.
+    /// Sessions ended because they were idle.
     pub expired: Counter,
-    /// Ended for their memory.
+    /// Sessions ended for their memory.
     pub evicted: Counter,
-    /// Ended by their owners.
+    /// Sessions deleted by their owners.
     pub deleted: Counter,
 }
 
-impl SessionMetrics {
-    /// Counts nothing.
-    pub fn unwatched() -> Self {
-        Self {
-            open: Gauge::noop(),
-            bytes: Gauge::noop(),
-            requests: Gauge::noop(),
-            opened: Counter::noop(),
-            expired: Counter::noop(),
-            evicted: Counter::noop(),
-            deleted: Counter::noop(),
-        }
-    }
-}
-
-/// The service's metrics; a recorder of its own, so that two services in one process do not mix.
+/// The service's metrics. They have their own recorder, so that two services in one process do not share counts.
 pub struct Metrics {
     recorder: PrometheusRecorder,
     handle: PrometheusHandle,
@@ -155,16 +126,17 @@ impl std::fmt::Debug for Metrics {
     }
 }
 
+/// Upper bounds of the histograms' buckets, in seconds.
 const BUCKETS: [f64; 15] = [
     0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0,
 ];
 const METADATA: Metadata<'static> = Metadata::new("darn", Level::INFO, None);
 
 impl Metrics {
-    /// An empty set.
+    /// Metrics that have counted nothing.
     ///
     /// # Errors
-    /// Never in practice: the buckets are constant.
+    /// None in practice: they would concern the constant buckets.
     pub fn new() -> Result<Self, BuildError> {
         let recorder = PrometheusBuilder::new()
             .set_buckets(&BUCKETS)?
@@ -221,7 +193,7 @@ impl Metrics {
         Ok(Self { recorder, handle })
     }
 
-    /// The handles the worker pool counts with.
+    /// The metrics of the worker pool.
     pub fn pool(&self) -> PoolMetrics {
         PoolMetrics {
             waiting: self.gauge("darn_jobs", "state", "waiting"),
@@ -233,7 +205,7 @@ impl Metrics {
         }
     }
 
-    /// The handles the kept sessions count with.
+    /// The metrics of the sessions.
     pub fn sessions(&self) -> SessionMetrics {
         let ended = |reason: &str| {
             let labels = vec![Label::new("reason", reason.to_owned())];
@@ -251,7 +223,7 @@ impl Metrics {
         }
     }
 
-    /// Counts an answer; `route` is the route's pattern, not the caller's path.
+    /// Records an answer; `route` is the route's pattern, not the caller's path.
     pub fn answered(&self, route: &str, status: u16, took: Duration) {
         let labels = vec![
             Label::new("route", route.to_owned()),
@@ -262,12 +234,12 @@ impl Metrics {
             .record(took.as_secs_f64());
     }
 
-    /// Counts the stages of a mend.
+    /// Records the holes and the stage timings of a mend.
     pub fn mended(&self, report: &v1::Report) {
         self.counter("darn_holes_filled_total", Vec::new())
             .increment(report.holes.len() as u64);
         if let Some(t) = &report.timings {
-            self.stages(&[
+            self.record_stages(&[
                 ("read", t.read),
                 ("weld", t.weld),
                 ("loops", t.loops),
@@ -277,7 +249,7 @@ impl Metrics {
             ]);
         }
         for t in report.holes.iter().filter_map(|hole| hole.timings.as_ref()) {
-            self.stages(&[
+            self.record_stages(&[
                 ("region", t.region),
                 ("flatten", t.flatten),
                 ("raster", t.raster),
@@ -288,19 +260,19 @@ impl Metrics {
         }
     }
 
-    fn stages(&self, milliseconds: &[(&str, f64)]) {
+    fn record_stages(&self, milliseconds: &[(&str, f64)]) {
         for (stage, ms) in milliseconds {
             self.histogram("darn_stage_seconds", "stage", stage)
                 .record(ms / 1000.0);
         }
     }
 
-    /// The Prometheus text.
+    /// The metrics in the Prometheus text format.
     pub fn render(&self) -> String {
         self.handle.render()
     }
 
-    /// Folds recorded samples into their buckets; without it they pile up when nobody scrapes.
+    /// Aggregates recorded samples into their buckets; without it samples accumulate while nobody reads the metrics.
     pub fn upkeep(&self) {
         self.handle.run_upkeep();
     }

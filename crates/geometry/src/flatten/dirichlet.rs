@@ -1,40 +1,46 @@
-//! The flip-free way out: symmetric Dirichlet energy by reweighted ARAP steps (SLIM; Rabinovich, Poranne, Panozzo, Sorkine-Hornung 2017).
+//! A flip-free layout: the symmetric Dirichlet energy, minimised by reweighted ARAP steps (SLIM; Rabinovich, Poranne,
+//! Panozzo, Sorkine-Hornung 2017).
 
 use nalgebra::Matrix2;
 
-use super::{FlattenError, RestTriangle};
+use super::chart::Layout;
+use super::error::FlattenError;
+use super::rest_triangle::RestTriangle;
 use crate::cholesky::Symmetric;
 use crate::mesh::{TriMesh, Vec2};
 
-/// Most steps; each refactors a system twice the size of ARAP's.
+/// Most steps; each factors a system twice the size of ARAP's.
 const STEPS: usize = 40;
 /// Steps end when one lowers the energy by less than this share.
 const GAIN: f64 = 1e-4;
 /// Share of the way to the first flip that a step may go.
 const SAFE: f64 = 0.8;
-/// Pull towards the point before the step, relative to the mean weight; keeps the system definite.
+/// Weight of the distance from the point before the step, per coordinate; keeps the system definite.
 const PROXIMAL: f64 = 1e-6;
 
-/// Minimises Σ_f A_f (‖J‖² + ‖J⁻¹‖²) from a start without flips; never flips a face. Returns the steps, too.
-pub fn minimise(
+/// Minimises Σ_f A_f (‖J‖² + ‖J⁻¹‖²) from a start without flips; never flips a face.
+///
+/// # Errors
+/// `Singular` when a step's system has no solution.
+pub(super) fn minimise(
     mesh: &TriMesh,
     rest: &[RestTriangle],
     start: &[Vec2],
-) -> Result<(Vec<Vec2>, usize), FlattenError> {
+) -> Result<Layout, FlattenError> {
     let gradients: Vec<[Vec2; 3]> = rest.iter().map(RestTriangle::gradients).collect();
-    let cloth = Cloth {
+    let problem = DirichletEnergy {
         mesh,
         rest,
         gradients,
     };
     let mut flat = start.to_vec();
-    let mut energy = cloth.energy(&flat);
+    let mut energy = problem.energy(&flat);
     let mut steps = 0;
     while steps < STEPS {
         steps += 1;
-        let goal = cloth.step(&flat)?;
+        let goal = problem.step(&flat)?;
         let direction: Vec<Vec2> = goal.iter().zip(&flat).map(|(g, p)| g - p).collect();
-        let mut length = (SAFE * cloth.first_flip(&flat, &direction)).min(1.0);
+        let mut length = (SAFE * problem.first_flip(&flat, &direction)).min(1.0);
         let before = energy;
         for _ in 0..20 {
             let tried: Vec<Vec2> = flat
@@ -42,7 +48,7 @@ pub fn minimise(
                 .zip(&direction)
                 .map(|(p, d)| p + d * length)
                 .collect();
-            let reached = cloth.energy(&tried);
+            let reached = problem.energy(&tried);
             if reached < energy {
                 (flat, energy) = (tried, reached);
                 break;
@@ -53,16 +59,21 @@ pub fn minimise(
             break;
         }
     }
-    Ok((flat, steps))
+    Ok(Layout {
+        flat,
+        rounds: steps,
+    })
 }
 
-struct Cloth<'a> {
+/// The energy of layouts of a mesh.
+struct DirichletEnergy<'a> {
     mesh: &'a TriMesh,
     rest: &'a [RestTriangle],
     gradients: Vec<[Vec2; 3]>,
 }
 
-impl Cloth<'_> {
+impl DirichletEnergy<'_> {
+    /// Jacobian of the map from the rest triangle of face `f` to the layout.
     fn jacobian(&self, f: usize, flat: &[Vec2]) -> Matrix2<f64> {
         let corners = self.mesh.faces[f].map(|v| flat[v as usize]);
         (0..3)
@@ -70,6 +81,7 @@ impl Cloth<'_> {
             .sum()
     }
 
+    /// The energy of a layout; infinite when a face is flipped.
     fn energy(&self, flat: &[Vec2]) -> f64 {
         let of = |f: usize| {
             let j = self.jacobian(f, flat);
@@ -92,7 +104,7 @@ impl Cloth<'_> {
         let mut matrix = Symmetric::zero(2 * flat.len());
         let mut rhs = vec![[0.0]; 2 * flat.len()];
         for (f, face) in self.mesh.faces.iter().enumerate() {
-            let (weight, rotation) = proxy(&self.jacobian(f, flat)).ok_or_else(singular)?;
+            let Proxy { weight, rotation } = proxy(&self.jacobian(f, flat)).ok_or_else(singular)?;
             let goal = weight * rotation;
             for r in 0..2 {
                 for c in 0..2 {
@@ -137,8 +149,16 @@ impl Cloth<'_> {
     }
 }
 
-/// W and R of the proxy at J = U diag(σ) Vᵀ: W = U diag(√((σ − σ⁻³)/(σ − 1))) Uᵀ, R = U Vᵀ.
-fn proxy(j: &Matrix2<f64>) -> Option<(Matrix2<f64>, Matrix2<f64>)> {
+/// The quadratic proxy ‖W (J − R)‖² of a face's energy.
+struct Proxy {
+    /// W.
+    weight: Matrix2<f64>,
+    /// R.
+    rotation: Matrix2<f64>,
+}
+
+/// The proxy at J = U diag(σ) Vᵀ: W = U diag(√((σ − σ⁻³)/(σ − 1))) Uᵀ, R = U Vᵀ. `None` when J has no decomposition.
+fn proxy(j: &Matrix2<f64>) -> Option<Proxy> {
     let svd = j.svd(true, true);
     let (u, vt) = (svd.u?, svd.v_t?);
     let weight = svd.singular_values.map(|s| {
@@ -149,7 +169,10 @@ fn proxy(j: &Matrix2<f64>) -> Option<(Matrix2<f64>, Matrix2<f64>)> {
             ((s - s.powi(-3)) / (s - 1.0)).sqrt()
         }
     });
-    Some((u * Matrix2::from_diagonal(&weight) * u.transpose(), u * vt))
+    Some(Proxy {
+        weight: u * Matrix2::from_diagonal(&weight) * u.transpose(),
+        rotation: u * vt,
+    })
 }
 
 /// The smallest positive root of a t² + b t + c, infinite if there is none.
@@ -158,7 +181,7 @@ fn smallest_positive_root(a: f64, b: f64, c: f64) -> f64 {
     if discriminant < 0.0 {
         return f64::INFINITY;
     }
-    // The stable pair of roots: no cancellation between b and the square root.
+    // The numerically stable pair of roots: no cancellation between b and the square root.
     let q = -0.5 * (b + discriminant.sqrt().copysign(b));
     let positive = |t: f64| if t > 0.0 { t } else { f64::INFINITY };
     positive(q / a).min(positive(c / q))
@@ -189,7 +212,9 @@ mod tests {
             .iter()
             .map(|p| Vec2::new(3.0 * p.0, 0.2 * p.1 + 0.5 * p.0))
             .collect();
-        let (flat, _) = minimise(&mesh, &RestTriangle::of(&mesh), &start).unwrap();
+        let flat = minimise(&mesh, &RestTriangle::of(&mesh), &start)
+            .unwrap()
+            .flat;
         for (a, b) in [(0, 1), (1, 2), (2, 3), (3, 0)] {
             assert!(((flat[a] - flat[b]).norm() - 1.0).abs() < 0.01);
         }

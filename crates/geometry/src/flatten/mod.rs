@@ -1,24 +1,34 @@
-//! From a region of cloth to its chart: unfolded face by face, relaxed by ARAP, the grid read off the result.
-//! Stages: `transport` → `arap` → (only when faces flip) `tutte` → `arap`, `dirichlet` → `raster`; all share one sparse factor.
-//! No holes are filled here and no file formats known; what is uncertain is reported as numbers or refused with them.
+//! From a region of cloth to its chart: unfolded face by face, relaxed by ARAP, and sampled on the grid.
+//!
+//! Stages: `transport` → `arap` → (only when faces flip) `tutte` → `arap`, `dirichlet` → `raster`. All ARAP stages
+//! share one sparse factor. Charts that stretch too much or flip faces are refused with numbers.
 
 mod arap;
+mod chart;
 mod dirichlet;
-mod frame;
+mod error;
 mod raster;
+mod rest_triangle;
 mod transport;
 mod tutte;
+mod uv_square;
 
-pub use frame::UvSquare;
+pub use chart::Chart;
+pub use error::FlattenError;
 pub use raster::raster;
+pub(crate) use rest_triangle::RestTriangle;
+pub use uv_square::UvSquare;
 
+use arap::ArapEnergy;
+use chart::{Layout, flipped_faces, stretch};
+
+use crate::mesh::Vec2;
 use crate::mesh::region::Region;
-use crate::mesh::{TriMesh, Vec2};
 
 /// What a chart may look like before it is refused.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlattenLimits {
-    /// Largest mean over edges of max(r, 1/r), r the stretch of an edge by the chart.
+    /// Largest mean over edges of max(r, 1/r), r = flat length ÷ scene length.
     pub mean_stretch: f64,
 }
 
@@ -28,100 +38,62 @@ impl Default for FlattenLimits {
     }
 }
 
-/// Why a region could not be flattened.
-#[derive(Debug, thiserror::Error, PartialEq)]
-pub enum FlattenError {
-    /// The sparse system of a stage had no positive definite factor: the region's triangles are degenerate.
-    #[error(
-        "the {stage} system of a region of {vertices} vertices cannot be solved; its triangles are degenerate"
-    )]
-    Singular {
-        /// Which stage's system.
-        stage: &'static str,
-        /// Vertices of the region.
-        vertices: usize,
-    },
-    /// The chart stretches the cloth beyond the limit.
-    #[error(
-        "mean stretch {stretch:.2} exceeds {limit:.2}; the surface around the hole is not cloth-like"
-    )]
-    TooStretched {
-        /// Mean over edges of max(r, 1/r).
-        stretch: f64,
-        /// The limit it exceeds.
-        limit: f64,
-    },
-    /// Faces stay flipped even with the flip-free energy.
-    #[error(
-        "{flipped} of {faces} faces flip in the chart; the surface around the hole is not cloth-like"
-    )]
-    Flipped {
-        /// Faces that are upside down.
-        flipped: usize,
-        /// Faces of the region.
-        faces: usize,
-    },
-}
+/// Most rounds of ARAP; the stop test usually ends them long before.
+const ROUNDS: usize = 150;
+/// Rounds of ARAP after which a hole's extent is right within a few per cent.
+const EXTENT_ROUNDS: usize = 6;
 
-/// Region vertices laid out in the plane, as nearly isometric as the cloth allows.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Chart {
-    /// One point per region vertex, scene units; faces are counter-clockwise.
-    pub flat: Vec<Vec2>,
-    /// The unit square of uv in the plane of `flat`.
-    pub frame: UvSquare,
-    /// Mean over edges of max(r, 1/r), r = flat length ÷ scene length.
-    pub stretch_mean: f64,
-    /// Maximum of the same.
-    pub stretch_max: f64,
-    /// Faces whose flat area is not positive.
-    pub flipped: usize,
-    /// Rounds of local and global steps.
-    pub rounds: usize,
-}
-
-impl Chart {
-    /// The uv of a region vertex.
-    pub fn uv(&self, vertex: u32) -> Vec2 {
-        self.frame.uv(self.flat[vertex as usize])
-    }
-}
-
-/// Flattens a region by ARAP (Liu et al. 2008; paper eq. 1) from the cloth unfolded face by face; where that flips faces, from Tutte's
-/// embedding; where that does, too, by the symmetric Dirichlet energy.
+/// Flattens a region by ARAP (Liu, Zhang, Xu, Gotsman, Gortler 2008) from the cloth unfolded face by face. Where that
+/// flips faces, it starts again from Tutte's embedding (Tutte 1963); where that flips faces, too, it minimises the
+/// symmetric Dirichlet energy (Rabinovich et al. 2017).
 ///
 /// Nothing is pinned but the rigid motion. Holes are open: their shape in the plane follows from the cloth around them.
 ///
 /// # Errors
 /// `Singular` for degenerate triangles, `TooStretched` and `Flipped` when the surface is too far from developable.
+///
+/// ```
+/// use darn_geometry::flatten::{FlattenLimits, flatten};
+/// use darn_geometry::mesh::loops::{LoopKind, boundary_loops};
+/// use darn_geometry::mesh::region::grow;
+/// use darn_geometry::mesh::shapes::holed_sheet;
+/// use darn_geometry::mesh::weld::weld;
+///
+/// // A flat sheet flattens to itself.
+/// let welded = weld(&holed_sheet(16, 0.2));
+/// let topology = welded.topology();
+/// let loops = boundary_loops(&welded.mesh, &topology);
+/// let hole = loops.iter().find(|l| l.kind == LoopKind::Hole).expect("the sheet has a hole");
+/// let region = grow(&welded.mesh, &topology, &loops, hole.id, 0.2)?;
+/// let chart = flatten(&region, &FlattenLimits::default())?;
+/// assert!(chart.stretch_max - 1.0 < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn flatten(region: &Region, limits: &FlattenLimits) -> Result<Chart, FlattenError> {
     let mesh = &region.mesh;
     let rest = RestTriangle::of(mesh);
-    let loops: Vec<&[u32]> = std::iter::once(&region.rim)
-        .chain(&region.holes)
-        .map(Vec::as_slice)
-        .collect();
-    let energy = arap::Energy::of(mesh, &rest)?;
+    let energy = ArapEnergy::new(mesh, &rest)?;
     let start = energy.assemble(&transport::rotations(mesh, &rest))?;
-    let (mut flat, mut rounds) = energy.minimise(start, arap::ROUNDS)?;
-    if flipped(mesh, &flat) > 0 {
-        let start = tutte::embed(mesh, &region.outer, &loops)?;
-        (flat, rounds) = energy.minimise(start.clone(), arap::ROUNDS)?;
-        if flipped(mesh, &flat) > 0 {
-            (flat, rounds) = dirichlet::minimise(mesh, &rest, &start)?;
+    let mut layout = energy.minimise(start, ROUNDS)?;
+    if flipped_faces(mesh, &layout.flat) > 0 {
+        let start = tutte::embed(region)?;
+        layout = energy.minimise(start.clone(), ROUNDS)?;
+        if flipped_faces(mesh, &layout.flat) > 0 {
+            layout = dirichlet::minimise(mesh, &rest, &start)?;
         }
     }
-    let flips = flipped(mesh, &flat);
-    if flips > 0 {
+    let Layout { flat, rounds } = layout;
+    let flipped = flipped_faces(mesh, &flat);
+    if flipped > 0 {
         return Err(FlattenError::Flipped {
-            flipped: flips,
+            flipped,
             faces: mesh.faces.len(),
         });
     }
-    let (stretch_mean, stretch_max) = stretch(mesh, &flat);
-    if stretch_mean > limits.mean_stretch {
+    let stretch = stretch(mesh, &flat);
+    if stretch.mean > limits.mean_stretch {
         return Err(FlattenError::TooStretched {
-            stretch: stretch_mean,
+            stretch: stretch.mean,
             limit: limits.mean_stretch,
         });
     }
@@ -129,120 +101,31 @@ pub fn flatten(region: &Region, limits: &FlattenLimits) -> Result<Chart, Flatten
     Ok(Chart {
         flat,
         frame,
-        stretch_mean,
-        stretch_max,
-        flipped: flips,
+        stretch_mean: stretch.mean,
+        stretch_max: stretch.max,
+        flipped,
         rounds,
     })
 }
 
-/// Rounds of ARAP that bring a hole's extent within a few per cent.
-const GLANCE: usize = 6;
-
-/// About how large a region's hole is when the cloth around it is laid flat: the larger side of its box in the frame of a hasty chart,
-/// scene units. A narrow region will do, and costs a small part of a chart worth sampling.
+/// About how large a region's hole is when the cloth around it is laid flat, scene units: the larger side of the
+/// hole's box in the uv square of a chart of six rounds.
+///
+/// A narrow region suffices, and costs a small part of a chart worth sampling.
 ///
 /// # Errors
 /// `Singular` for degenerate triangles.
 pub fn hole_extent(region: &Region) -> Result<f64, FlattenError> {
     let mesh = &region.mesh;
     let rest = RestTriangle::of(mesh);
-    let energy = arap::Energy::of(mesh, &rest)?;
+    let energy = ArapEnergy::new(mesh, &rest)?;
     let start = energy.assemble(&transport::rotations(mesh, &rest))?;
-    let (flat, _) = energy.minimise(start, GLANCE)?;
+    let flat = energy.minimise(start, EXTENT_ROUNDS)?.flat;
     let frame = UvSquare::tightest(&flat);
     let rim = region.rim.iter().map(|v| frame.uv(flat[*v as usize]));
     let nowhere = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
     let (low, high) = rim.fold(nowhere, |(low, high), uv| (low.inf(&uv), high.sup(&uv)));
     Ok((high - low).max() * frame.side)
-}
-
-/// Faces whose area in the plane is not positive.
-fn flipped(mesh: &TriMesh, flat: &[Vec2]) -> usize {
-    mesh.faces
-        .iter()
-        .filter(|f| doubled_area(f, flat) <= 0.0)
-        .count()
-}
-
-/// Twice the signed area of a face in the plane.
-fn doubled_area(face: &[u32; 3], flat: &[Vec2]) -> f64 {
-    let [a, b, c] = face.map(|v| flat[v as usize]);
-    (b - a).perp(&(c - a))
-}
-
-/// Mean and maximum of max(r, 1/r) over all face edges, r = flat length ÷ scene length.
-fn stretch(mesh: &TriMesh, flat: &[Vec2]) -> (f64, f64) {
-    let (mut sum, mut most, mut count) = (0.0, 1.0f64, 0usize);
-    for face in &mesh.faces {
-        for k in 0..3 {
-            let (a, b) = (face[k] as usize, face[(k + 1) % 3] as usize);
-            let length = (mesh.positions[a] - mesh.positions[b]).norm();
-            let r = (flat[a] - flat[b]).norm() / length.max(f64::MIN_POSITIVE);
-            let r = r.max(1.0 / r.max(f64::MIN_POSITIVE));
-            sum += r;
-            most = most.max(r);
-            count += 1;
-        }
-    }
-    (sum / count.max(1) as f64, most)
-}
-
-/// A face laid isometrically into the plane, first corner at the origin, first edge along x.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct RestTriangle {
-    /// Corners in the plane.
-    pub corners: [Vec2; 3],
-    /// Cotangent of the angle opposite the edge from corner k to corner k + 1; bounded for slivers.
-    pub cotangent: [f64; 3],
-    /// Area; at least a small share of the squared longest edge.
-    pub area: f64,
-}
-
-impl RestTriangle {
-    /// Slivers count as triangles of this height ÷ longest edge: their true cotangents would drown all others.
-    const FLATTEST: f64 = 1e-3;
-
-    /// Rest triangles of all faces of a mesh.
-    pub fn of(mesh: &TriMesh) -> Vec<RestTriangle> {
-        let lay = |f: &[u32; 3]| {
-            let [a, b, c] = f.map(|v| mesh.positions[v as usize]);
-            let (ab, ac) = (b - a, c - a);
-            let length = ab.norm().max(f64::MIN_POSITIVE);
-            let x = ac.dot(&ab) / length;
-            let longest = length.max(ac.norm()).max((c - b).norm());
-            let y = (ac.norm_squared() - x * x)
-                .max(0.0)
-                .sqrt()
-                .max(Self::FLATTEST * longest);
-            Self::from_corners([Vec2::zeros(), Vec2::new(length, 0.0), Vec2::new(x, y)])
-        };
-        mesh.faces.iter().map(lay).collect()
-    }
-
-    /// The rest triangle with the given counter-clockwise corners.
-    pub fn from_corners(corners: [Vec2; 3]) -> RestTriangle {
-        let doubled = (corners[1] - corners[0])
-            .perp(&(corners[2] - corners[0]))
-            .max(f64::MIN_POSITIVE);
-        let cotangent = [0, 1, 2].map(|k: usize| {
-            let (a, b, opposite) = (corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]);
-            (a - opposite).dot(&(b - opposite)) / doubled
-        });
-        RestTriangle {
-            corners,
-            cotangent,
-            area: 0.5 * doubled,
-        }
-    }
-
-    /// Gradients gₖ of the three hat functions: the Jacobian of a map with corner values uₖ is Σ uₖ gₖᵀ.
-    pub fn gradients(&self) -> [Vec2; 3] {
-        [0, 1, 2].map(|k: usize| {
-            let e = self.corners[(k + 2) % 3] - self.corners[(k + 1) % 3];
-            Vec2::new(-e.y, e.x) / (2.0 * self.area)
-        })
-    }
 }
 
 #[cfg(test)]
@@ -253,17 +136,18 @@ mod tests {
     use crate::mesh::Vec3;
     use crate::mesh::loops::{LoopKind, boundary_loops};
     use crate::mesh::region::grow;
-    use crate::mesh::shapes::{shaken, sheet};
+    use crate::mesh::shapes::{jitter, sheet};
     use crate::mesh::weld::weld;
 
-    /// The region round the hole of a sheet laid out by `place`.
+    /// The region around the hole of a sheet laid out by `place`.
     fn region(n: usize, noise: f64, seed: u64, place: impl Fn(f64, f64) -> Vec3) -> Region {
         let keep = |u: f64, v: f64| (u - 0.5).hypot(v - 0.5) > 0.2;
-        let welded = weld(&shaken(&sheet(n, keep, place), noise / n as f64, seed));
+        let welded = weld(&jitter(&sheet(n, keep, place), noise / n as f64, seed));
         let topology = welded.topology();
         let loops = boundary_loops(&welded.mesh, &topology);
-        let hole = loops.iter().position(|l| l.kind == LoopKind::Hole);
-        grow(&welded.mesh, &topology, &loops, hole.expect("a hole"), 0.25).expect("a region")
+        let hole = loops.iter().find(|l| l.kind == LoopKind::Hole);
+        let hole = hole.expect("a hole").id;
+        grow(&welded.mesh, &topology, &loops, hole, 0.25).expect("a region")
     }
 
     fn rolled(bend: f64) -> impl Fn(f64, f64) -> Vec3 {
@@ -293,7 +177,7 @@ mod tests {
             prop_assert_eq!(chart.flipped, 0);
             // Chords of the roll are developable, too.
             prop_assert!(chart.stretch_max < 1.01, "{}", chart.stretch_max);
-            // What the hole measures on the unrolled sheet, whichever way the frame is turned.
+            // The extent of the hole on the unrolled sheet, for every rotation of the square.
             let unrolled = |p: Vec3| Vec2::new(p.x.atan2(p.z).rem_euclid(std::f64::consts::TAU) / bend, p.y);
             let rim: Vec<Vec2> = (region.rim.iter()).map(|v| unrolled(region.mesh.positions[*v as usize])).collect();
             let sides: Vec<f64> = (0..90).map(|degrees| larger_side(&rim, f64::from(degrees).to_radians())).collect();
@@ -307,11 +191,11 @@ mod tests {
             let region = region(n, noise, seed, |u, v| Vec3::new(u, v, 0.08 * (7.0 * u).sin() * (5.0 * v).cos()));
             let mesh = &region.mesh;
             let rest = RestTriangle::of(mesh);
-            let energy = arap::Energy::of(mesh, &rest).expect("a factor");
+            let energy = ArapEnergy::new(mesh, &rest).expect("a factor");
             let unfolded = energy.assemble(&transport::rotations(mesh, &rest)).expect("a layout");
-            let tutte = tutte::embed(mesh, &region.outer, &[&region.rim]).expect("a layout");
-            let [a, b] = [unfolded, tutte].map(|start| energy.minimise(start, arap::ROUNDS).expect("a chart").0);
-            let (a, b) = (stretch(mesh, &a).0 - 1.0, stretch(mesh, &b).0 - 1.0);
+            let tutte = tutte::embed(&region).expect("a layout");
+            let [a, b] = [unfolded, tutte].map(|start| energy.minimise(start, ROUNDS).expect("a chart").flat);
+            let (a, b) = (stretch(mesh, &a).mean - 1.0, stretch(mesh, &b).mean - 1.0);
             prop_assert!((a - b).abs() < 0.02 * b + 1e-6, "{a} {b}");
         }
     }

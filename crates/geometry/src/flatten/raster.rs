@@ -1,12 +1,13 @@
-//! From a chart to its grid: every cell centre that lies on a face gets the position there (barycentric), all others stay unknown.
+//! From a chart to its grid: a cell whose centre lies on a face gets the position there (barycentric), all other
+//! cells stay unknown.
 
-use super::Chart;
+use super::chart::Chart;
 use crate::grid::{Grid, SIDE, cell_index};
 use crate::mesh::{TriMesh, Vec2};
 
-/// Samples a region's positions at the centres of the cells that its faces cover.
+/// Samples the positions of a mesh, scene space, at the centres of the cells that its faces cover in `chart`.
 ///
-/// Where faces overlap in the chart, the face of the lower index wins.
+/// Where faces overlap in the chart, the face of lower index counts.
 pub fn raster(mesh: &TriMesh, chart: &Chart) -> Grid {
     let mut grid = Grid::unknown();
     for face in &mesh.faces {

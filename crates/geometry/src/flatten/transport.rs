@@ -1,13 +1,15 @@
-//! Rotations that unfold a surface face by face: carried across edges, breadth first, they agree wherever the cloth is developable.
+//! Rotations that unfold a surface face by face (discrete parallel transport), breadth first across edges. Where the
+//! cloth is developable they do not depend on the path.
 
-use super::RestTriangle;
+use super::rest_triangle::RestTriangle;
 use crate::mesh::{TriMesh, Vec2};
 
-/// Per face the unit vector that turns its rest triangle so that it lies beside the one it was reached from.
+/// Per face the unit vector that rotates its rest triangle to lie beside the one it was reached from. The first face
+/// of a component is not rotated.
 ///
-/// On a curved surface they depend on the way; as a start for ARAP they need not be better.
-pub fn rotations(mesh: &TriMesh, rest: &[RestTriangle]) -> Vec<Vec2> {
-    let beside = neighbours(mesh);
+/// On a curved surface the rotations depend on the path; they are good enough as a start for ARAP.
+pub(super) fn rotations(mesh: &TriMesh, rest: &[RestTriangle]) -> Vec<Vec2> {
+    let across = neighbours(mesh);
     let edge = |f: usize, k: usize| rest[f].corners[(k + 1) % 3] - rest[f].corners[k];
     let mut turn = vec![Vec2::zeros(); mesh.faces.len()];
     let mut reached = vec![false; mesh.faces.len()];
@@ -22,7 +24,7 @@ pub fn rotations(mesh: &TriMesh, rest: &[RestTriangle]) -> Vec<Vec2> {
         while let Some(&f) = queue.get(next) {
             next += 1;
             for k in 0..3 {
-                let Some((g, l)) = beside[3 * f + k] else {
+                let Some(Neighbour { face: g, corner: l }) = across[3 * f + k] else {
                     continue;
                 };
                 if !std::mem::replace(&mut reached[g], true) {
@@ -43,8 +45,15 @@ fn product(a: Vec2, b: Vec2) -> Vec2 {
     Vec2::new(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x)
 }
 
-/// Per half-edge (3 · face + corner) the face across it and the corner its edge starts from there.
-fn neighbours(mesh: &TriMesh) -> Vec<Option<(usize, usize)>> {
+/// The face across a half-edge, and the corner there that the common edge starts from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Neighbour {
+    face: usize,
+    corner: usize,
+}
+
+/// Per half-edge (3 · face + corner) the face across it. Where several fit, the first counts.
+fn neighbours(mesh: &TriMesh) -> Vec<Option<Neighbour>> {
     let count = 3 * mesh.faces.len();
     let ends = |h: usize| {
         let face = &mesh.faces[h / 3];
@@ -62,7 +71,8 @@ fn neighbours(mesh: &TriMesh) -> Vec<Option<(usize, usize)>> {
         leaving[*place] = h;
         *place += 1;
     }
-    // Sorted, for a hub's would be looked through once for every face at it; where several come into question the first is taken.
+    // Sorted for binary search: a linear search at a vertex with many faces would be quadratic. Of several matches
+    // the first is taken.
     for s in starts.windows(2) {
         leaving[s[0]..s[1]].sort_unstable_by_key(|&h| (ends(h).1, h));
     }
@@ -72,7 +82,10 @@ fn neighbours(mesh: &TriMesh) -> Vec<Option<(usize, usize)>> {
             let back = &leaving[starts[to as usize]..starts[to as usize + 1]];
             let first = back.get(back.partition_point(|&t| ends(t).1 < from));
             let twin = first.copied().filter(|&t| ends(t).1 == from)?;
-            Some((twin / 3, twin % 3))
+            Some(Neighbour {
+                face: twin / 3,
+                corner: twin % 3,
+            })
         })
         .collect()
 }
@@ -91,29 +104,35 @@ mod tests {
         }
     }
 
-    /// For every half-edge the first of all that runs the other way.
-    fn by_looking_through(faces: &[[u32; 3]]) -> Vec<Option<(usize, usize)>> {
+    /// For every half-edge the first of all half-edges that runs the other way.
+    fn by_linear_search(faces: &[[u32; 3]]) -> Vec<Option<Neighbour>> {
         let ends = |h: usize| (faces[h / 3][h % 3], faces[h / 3][(h % 3 + 1) % 3]);
         let twin = |h: usize| {
             let (from, to) = ends(h);
             (0..3 * faces.len()).find(|t| ends(*t) == (to, from))
         };
         (0..3 * faces.len())
-            .map(|h| twin(h).map(|t| (t / 3, t % 3)))
+            .map(twin)
+            .map(|twin| {
+                twin.map(|t| Neighbour {
+                    face: t / 3,
+                    corner: t % 3,
+                })
+            })
             .collect()
     }
 
     proptest! {
         #[test]
-        fn half_edges_are_paired_as_by_looking_through_all(faces in prop::collection::vec(prop::array::uniform3(0u32..12), 1..60)) {
-            // Most such edges have more than two faces, some one end only.
-            let expected = by_looking_through(&faces);
+        fn half_edges_are_paired_as_by_linear_search(faces in prop::collection::vec(prop::array::uniform3(0u32..12), 1..60)) {
+            // Most edges of random faces have more than two faces; some have one vertex at both ends.
+            let expected = by_linear_search(&faces);
             prop_assert_eq!(neighbours(&mesh(12, faces)), expected);
         }
     }
 
     #[test]
-    fn a_fan_round_a_hub_unfolds_to_a_disk() {
+    fn a_fan_of_many_faces_unfolds_to_a_disk() {
         let spokes = 50_000u32;
         let faces = (0..spokes).map(|k| [0, 1 + k, 1 + (k + 1) % spokes]);
         let fan = mesh(spokes as usize + 1, faces.collect());

@@ -1,20 +1,23 @@
-//! Tutte's embedding: the outer loop on a circle, every other vertex at the mean of its neighbours; flip-free by theorem (Tutte 1963).
+//! Tutte's embedding: the outer loop on a circle, every other vertex at the mean of its neighbours. It flips no face
+//! (Tutte 1963).
 
 use std::f64::consts::TAU;
 
-use super::FlattenError;
+use super::error::FlattenError;
 use crate::cholesky::Symmetric;
+use crate::mesh::region::Region;
 use crate::mesh::{TriMesh, Vec2};
 
-/// Embeds a disk whose inner `loops` are each closed by one virtual vertex joined to all of the loop.
+/// Embeds a region whose rim and holes are each closed by one virtual vertex joined to all of the loop.
 ///
-/// `outer` runs with the surface on its left. The circle's circumference is the outer loop's length, so the start is of the right size.
-pub fn embed(mesh: &TriMesh, outer: &[u32], loops: &[&[u32]]) -> Result<Vec<Vec2>, FlattenError> {
+/// The circle's circumference is the length of the outer loop, so the layout has about the right size.
+///
+/// # Errors
+/// `Singular` when the system has no solution.
+pub(super) fn embed(region: &Region) -> Result<Vec<Vec2>, FlattenError> {
+    let Region { mesh, outer, .. } = region;
+    let loops: Vec<&Vec<u32>> = std::iter::once(&region.rim).chain(&region.holes).collect();
     let count = mesh.positions.len();
-    let singular = FlattenError::Singular {
-        stage: "Tutte",
-        vertices: count,
-    };
     let fixed = circle(mesh, outer);
     let mut unknown = vec![usize::MAX; count + loops.len()];
     let free = (0..count + loops.len()).filter(|v| *v >= count || fixed[*v].is_none());
@@ -33,7 +36,7 @@ pub fn embed(mesh: &TriMesh, outer: &[u32], loops: &[&[u32]]) -> Result<Vec<Vec2
         (i, j) => matrix.add_spring(i, j, 1.0),
     };
     for face in &mesh.faces {
-        // Inner edges are met from both sides and weigh 2, boundary edges 1: any positive symmetric weights will do.
+        // Inner edges are added from both sides and weigh 2, boundary edges 1: any positive symmetric weights work.
         for k in 0..3 {
             join(face[k] as usize, face[(k + 1) % 3] as usize);
         }
@@ -41,8 +44,8 @@ pub fn embed(mesh: &TriMesh, outer: &[u32], loops: &[&[u32]]) -> Result<Vec<Vec2
     for (k, rim) in loops.iter().enumerate() {
         rim.iter().for_each(|v| join(count + k, *v as usize));
     }
-    let factor = matrix.factor().map_err(|_| singular)?;
-    factor.solve(&mut rhs).map_err(|_| FlattenError::Singular {
+    let solved = matrix.factor().and_then(|factor| factor.solve(&mut rhs));
+    solved.map_err(|_| FlattenError::Singular {
         stage: "Tutte",
         vertices: count,
     })?;

@@ -1,55 +1,61 @@
-//! Noise of a scanner on cloth: how much there is, and the surface without it.
+//! Scanner noise: how much of it a mesh has, and the mesh without it.
 //!
-//! The level is what vertices stand off from a cubic through the two rings around them; folds are cubics at that scale, noise is not.
-//! Noise is taken off by a smoothing spline over the mesh: every vertex gives way to the bending energy of all of them, the more the
-//! noisier the scan is. That evens vertices along the surface, too, where noise folds triangles over: laid flat, each of those would ask
-//! for its area twice.
+//! The noise level is the distance of vertices from a cubic fitted to the two rings around them: at that scale folds
+//! are close to cubics, noise is not. Noise is removed by a smoothing spline over the mesh: positions minimise their
+//! distance from the scan plus a bending energy whose weight grows with the noise level. This also evens out vertices
+//! along the surface. There noise folds triangles over, and a chart would need the area of each folded triangle
+//! twice.
 
 use nalgebra::{SMatrix, SVector};
 
 use super::curvature::doubled_normal;
+use super::index::HalfEdgeId;
 use super::topology::corners_by_vertex;
 use super::{TriMesh, Vec3};
 use crate::cholesky::Symmetric;
 
-/// Level, in mean edges, below which a mesh counts as clean. Cloth without noise reads 0.00 to 0.05, one in twenty, all crumpled, 0.1.
+/// Noise level, in mean edges, below which a mesh counts as clean. Noise-free cloth reads 0.00 to 0.05; one sheet in
+/// twenty, all of it crumpled, reads 0.1.
 const CLEAN: f64 = 0.07;
-/// Weight of the bending energy at a level of one edge; it grows with the level's square, as the noise's own energy does.
+/// Weight of the bending energy at a noise level of one mean edge; it grows with the square of the level, as the
+/// energy of noise does.
 const STIFFNESS: f64 = 40.0;
-/// The same along a border: a ragged one is no noise.
+/// The same along a border, which may be ragged without noise.
 const BORDER_STIFFNESS: f64 = 12.0;
-/// Vertices that the level is estimated from, about; evenly spread over the numbering.
+/// About how many vertices the noise level is estimated from, evenly spread over the numbering.
 const SAMPLES: usize = 1000;
-/// As many show that a scan is far from noisy, as most are.
-const GLANCE: usize = 150;
-/// Mean of |x| below its lower quartile, of a standard normal variable. The lower quarter, for noise is everywhere, crumple is not.
+/// About how many suffice to recognise a scan that is far from noisy, as most are.
+const SCREENING_SAMPLES: usize = 150;
+/// Mean of |x| below its lower quartile, x standard normal. Lower quartile: noise raises every vertex, creases only a
+/// few.
 const LOWER_QUARTER: f64 = 0.1580;
-/// Faces at a vertex; one with more is a hub. A hub is no scanner's cloth, so its place says nothing of noise, and the square of its
-/// bending row has half the square of its neighbours in entries: of half a million they would not fit into memory.
+/// A vertex with more faces is a hub. Scanners make no hubs, so its position tells nothing about noise; and its row
+/// of the bending energy has ½ k² entries for k neighbours, which would not fit into memory for half a million.
 const MOST_FACES: usize = 64;
 /// Terms of a cubic in two variables.
 const TERMS: usize = 10;
 
-/// The mesh with its noise taken off; `None` when there is none worth mentioning.
+/// The mesh without its noise; `None` when its noise level is below that of clean cloth.
 ///
-/// Same faces, same vertices, only their positions differ: x minimises Σ |xᵥ − scannedᵥ|² + λ Σ |mean of v's neighbours − xᵥ|², along the
-/// border with neighbours there alone, hubs left out. Works on any mesh; one sparse factor.
-pub fn denoised(mesh: &TriMesh) -> Option<TriMesh> {
-    let around = Around::of(mesh);
-    if level(mesh, &around, GLANCE) < 0.5 * CLEAN {
+/// Only positions change: x minimises Σ |xᵥ − scannedᵥ|² + λ Σ |mean of v's neighbours − xᵥ|², where border vertices
+/// have only their neighbours on the border, and hubs (more than 64 faces) have no second term. Works on any mesh;
+/// one sparse factor.
+pub fn denoise(mesh: &TriMesh) -> Option<TriMesh> {
+    let incidence = Incidence::of(mesh);
+    if noise_level(mesh, &incidence, SCREENING_SAMPLES) < 0.5 * CLEAN {
         return None;
     }
-    let level = level(mesh, &around, SAMPLES);
+    let level = noise_level(mesh, &incidence, SAMPLES);
     if !(level > CLEAN && level.is_finite()) {
         return None;
     }
     let mut energy = Symmetric::zero(mesh.positions.len());
     for v in 0..mesh.positions.len() {
         energy.add(v, v, 1.0);
-        if around.is_hub(v as u32) {
+        if incidence.is_hub(v as u32) {
             continue;
         }
-        let (neighbours, stiffness) = around.neighbours(mesh, v as u32);
+        let (neighbours, stiffness) = incidence.neighbours(mesh, v as u32);
         let share = 1.0 / neighbours.len() as f64;
         let bend = neighbours.iter().map(|w| (*w as usize, share));
         let bend: Vec<_> = bend.chain([(v, -1.0)]).collect();
@@ -65,26 +71,27 @@ pub fn denoised(mesh: &TriMesh) -> Option<TriMesh> {
     })
 }
 
-/// The corners at every vertex; a corner's face is a third of its number.
-struct Around {
+/// The corners at every vertex, each as the half-edge that leaves it.
+struct Incidence {
     starts: Vec<u32>,
-    corners: Vec<u32>,
+    corners: Vec<HalfEdgeId>,
 }
 
-impl Around {
-    fn of(mesh: &TriMesh) -> Around {
+impl Incidence {
+    fn of(mesh: &TriMesh) -> Incidence {
         let (starts, corners) = corners_by_vertex(mesh.faces.as_flattened(), mesh.positions.len());
-        Around { starts, corners }
+        Incidence { starts, corners }
     }
 
     /// The faces at a vertex, ascending.
     fn faces_at(&self, vertex: u32) -> impl Iterator<Item = u32> {
         let v = vertex as usize;
         let corners = &self.corners[self.starts[v] as usize..self.starts[v + 1] as usize];
-        corners.iter().map(|corner| corner / 3)
+        corners.iter().map(|corner| corner.face().0)
     }
 
-    /// The other corners of the faces at a vertex, ascending: twice those inside, once those that follow on a border.
+    /// The other corners of the faces at a vertex, ascending: those joined by an inner edge come twice, by a border
+    /// edge once.
     fn others(&self, mesh: &TriMesh, vertex: u32) -> Vec<u32> {
         let corners = self.faces_at(vertex).flat_map(|f| mesh.faces[f as usize]);
         let mut others: Vec<u32> = corners.filter(|w| *w != vertex).collect();
@@ -98,13 +105,14 @@ impl Around {
     }
 
     fn is_border(&self, mesh: &TriMesh, vertex: u32) -> bool {
-        once(&self.others(mesh, vertex)).next().is_some()
+        singles(&self.others(mesh, vertex)).next().is_some()
     }
 
-    /// A vertex's neighbours, ascending, of one on a border those on the border; and how stiffly it keeps to their middle.
+    /// The neighbours whose mean a vertex is drawn to, ascending (on a border, those along the border), and the
+    /// stiffness of that term.
     fn neighbours(&self, mesh: &TriMesh, vertex: u32) -> (Vec<u32>, f64) {
         let mut others = self.others(mesh, vertex);
-        let border: Vec<u32> = once(&others).collect();
+        let border: Vec<u32> = singles(&others).collect();
         others.dedup();
         if border.is_empty() {
             (others, STIFFNESS)
@@ -113,14 +121,15 @@ impl Around {
         }
     }
 
-    /// The normal at a vertex, weighted by area.
+    /// The unit normal at a vertex, weighted by area.
     fn normal(&self, mesh: &TriMesh, vertex: u32) -> Option<Vec3> {
         let faces = self.faces_at(vertex);
         let sum: Vec3 = faces.map(|f| doubled_normal(mesh, f as usize)).sum();
         sum.try_normalize(0.0)
     }
 
-    /// The vertices within two edges of a vertex, without itself, ascending. Not those beyond a hub: all round it would gather them.
+    /// The vertices within two edges of a vertex, without itself, ascending; those behind a hub are left out, or
+    /// every neighbour of the hub would collect all others.
     fn two_rings(&self, mesh: &TriMesh, vertex: u32) -> Vec<u32> {
         let ring = self.others(mesh, vertex);
         let near = ring.iter().filter(|w| !self.is_hub(**w));
@@ -133,8 +142,8 @@ impl Around {
     }
 }
 
-/// What is in a sorted list once.
-fn once(sorted: &[u32]) -> impl Iterator<Item = u32> {
+/// The items that a sorted list has exactly once.
+fn singles(sorted: &[u32]) -> impl Iterator<Item = u32> {
     let alike = sorted.chunk_by(|a, b| a == b);
     alike.filter_map(|all| match all {
         [one] => Some(*one),
@@ -142,33 +151,34 @@ fn once(sorted: &[u32]) -> impl Iterator<Item = u32> {
     })
 }
 
-/// Standard deviation of the noise across the surface, in mean edges; 0 for a mesh with no inner vertices.
-fn level(mesh: &TriMesh, around: &Around, samples: usize) -> f64 {
+/// Standard deviation of the noise across the surface, in mean edges; 0 for a mesh without inner vertices.
+fn noise_level(mesh: &TriMesh, incidence: &Incidence, samples: usize) -> f64 {
     let stride = (mesh.positions.len() / samples).max(1);
-    let mut off: Vec<f64> = (0..mesh.positions.len() as u32)
+    let mut distances: Vec<f64> = (0..mesh.positions.len() as u32)
         .step_by(stride)
-        .filter(|v| !around.is_hub(*v) && !around.is_border(mesh, *v))
-        .filter_map(|v| stand_off(mesh, around, v))
+        .filter(|v| !incidence.is_hub(*v) && !incidence.is_border(mesh, *v))
+        .filter_map(|v| distance_from_cubic(mesh, incidence, v))
         .collect();
-    if off.is_empty() {
+    if distances.is_empty() {
         return 0.0;
     }
-    let quarter = off.len().div_ceil(4);
-    off.select_nth_unstable_by(quarter - 1, f64::total_cmp);
-    let mean = off[..quarter].iter().sum::<f64>() / quarter as f64;
+    let quarter = distances.len().div_ceil(4);
+    distances.select_nth_unstable_by(quarter - 1, f64::total_cmp);
+    let mean = distances[..quarter].iter().sum::<f64>() / quarter as f64;
     mean / LOWER_QUARTER / mean_edge(mesh).max(f64::MIN_POSITIVE)
 }
 
-/// How far an inner vertex lies from the cubic fitted to the two rings around it, scene units, in standard deviations of one vertex: the
-/// cubic's own error there is taken off. `None` where the rings do not determine a cubic.
-fn stand_off(mesh: &TriMesh, around: &Around, vertex: u32) -> Option<f64> {
-    let rings = around.two_rings(mesh, vertex);
+/// Distance of an inner vertex from the cubic fitted to the two rings around it, scene units, scaled so that its
+/// standard deviation is that of one vertex's noise (the noise of the cubic is divided out). `None` where the rings
+/// do not determine a cubic.
+fn distance_from_cubic(mesh: &TriMesh, incidence: &Incidence, vertex: u32) -> Option<f64> {
+    let rings = incidence.two_rings(mesh, vertex);
     if rings.len() <= TERMS {
         return None;
     }
     let centre = mesh.positions[vertex as usize];
     let place = |v: &u32| mesh.positions[*v as usize] - centre;
-    let normal = around.normal(mesh, vertex)?;
+    let normal = incidence.normal(mesh, vertex)?;
     let mut axis = Vec3::zeros();
     axis[normal.iamin()] = 1.0;
     let across = normal.cross(&axis).normalize();
@@ -187,7 +197,7 @@ fn stand_off(mesh: &TriMesh, around: &Around, vertex: u32) -> Option<f64> {
     let factor = matrix.cholesky()?;
     let mut at_centre = SVector::<f64, TERMS>::zeros();
     at_centre[0] = 1.0;
-    // The variance of the cubic's value at the vertex, in that of one neighbour.
+    // The variance of the cubic's value at the vertex, in units of one neighbour's variance.
     let error = factor.solve(&at_centre)[0];
     let off = factor.solve(&rhs)[0] * size / (1.0 + error).sqrt();
     off.is_finite().then_some(off.abs())
@@ -207,10 +217,10 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::mesh::shapes::{holed_sheet, shaken, sheet, together};
+    use crate::mesh::shapes::{concat, holed_sheet, jitter, sheet};
 
-    fn noise_level(mesh: &TriMesh) -> f64 {
-        level(mesh, &Around::of(mesh), SAMPLES)
+    fn level(mesh: &TriMesh) -> f64 {
+        noise_level(mesh, &Incidence::of(mesh), SAMPLES)
     }
 
     fn waves(u: f64, v: f64) -> Vec3 {
@@ -218,7 +228,7 @@ mod tests {
     }
 
     /// Root mean square distance from the waves, in edges of 1/n.
-    fn off(mesh: &TriMesh, n: usize) -> f64 {
+    fn distance(mesh: &TriMesh, n: usize) -> f64 {
         let squares = mesh
             .positions
             .iter()
@@ -232,7 +242,7 @@ mod tests {
         (0..mesh.faces.len() as u32).filter(down).count()
     }
 
-    /// Vertex 0 at a height over the middle of a ring, joined to so many vertices on it.
+    /// A cone: vertex 0 at a height over the middle of a ring, joined to `spokes` vertices on it.
     fn cone(spokes: u32, height: f64) -> TriMesh {
         let on_ring = |k: u32| {
             let angle = std::f64::consts::TAU * f64::from(k) / f64::from(spokes);
@@ -253,54 +263,54 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(16))]
 
         #[test]
-        fn clean_cloth_is_left_alone(n in 24usize..40, fold in 0.0..12.0f64) {
+        fn clean_cloth_is_not_changed(n in 24usize..40, fold in 0.0..12.0f64) {
             let folded = sheet(n, |_, _| true, |u, v| Vec3::new(u, v, 0.05 * (fold * (u + v)).sin()));
-            prop_assert!(noise_level(&folded) < 0.03, "{}", noise_level(&folded));
-            prop_assert_eq!(denoised(&folded), None);
+            prop_assert!(level(&folded) < 0.03, "{}", level(&folded));
+            prop_assert_eq!(denoise(&folded), None);
         }
 
         #[test]
-        fn noise_is_measured_and_taken_off(n in 24usize..40, noise in 0.2..0.5f64, seed: u64) {
-            // Even noise three times over is near enough to normal, with the variance of once; the mean edge of the squares' halves is 1.14 of
-            // their side.
+        fn noise_is_measured_and_removed(n in 24usize..40, noise in 0.2..0.5f64, seed: u64) {
+            // The sum of three uniform shifts is close to a normal one; the mean edge of the squares' halves is 1.14
+            // of their side.
             let amount = noise / n as f64 / 3f64.sqrt();
             let clean = sheet(n, |_, _| true, waves);
-            let noisy = (0..3).fold(clean, |mesh, turn| shaken(&mesh, amount, seed.wrapping_add(turn)));
+            let noisy = (0..3).fold(clean, |mesh, turn| jitter(&mesh, amount, seed.wrapping_add(turn)));
             let true_level = noise / 3f64.sqrt() / 1.14;
-            let level = noise_level(&noisy);
-            prop_assert!((level / true_level - 1.0).abs() < 0.4, "{level} {true_level}");
-            let smooth = denoised(&noisy);
+            let measured = level(&noisy);
+            prop_assert!((measured / true_level - 1.0).abs() < 0.4, "{measured} {true_level}");
+            let smooth = denoise(&noisy);
             prop_assert!(smooth.is_some());
             if let Some(smooth) = smooth {
                 prop_assert_eq!(&smooth.faces, &noisy.faces);
-                prop_assert!(off(&smooth, n) < 0.85 * off(&noisy, n), "{} {}", off(&smooth, n), off(&noisy, n));
+                prop_assert!(distance(&smooth, n) < 0.85 * distance(&noisy, n), "{} {}", distance(&smooth, n), distance(&noisy, n));
                 prop_assert!(folded_over(&smooth) * 4 <= folded_over(&noisy), "{} {}", folded_over(&smooth), folded_over(&noisy));
             }
         }
     }
 
     #[test]
-    fn a_hub_stays_and_gathers_no_rings() {
-        let noisy = shaken(&sheet(24, |_, _| true, waves), 0.3 / 24.0, 7);
+    fn a_hub_stays_and_collects_no_rings() {
+        let noisy = jitter(&sheet(24, |_, _| true, waves), 0.3 / 24.0, 7);
         let lift = |spokes: u32| {
-            let smooth = denoised(&together(&cone(spokes, 0.05), &noisy)).expect("noise");
+            let smooth = denoise(&concat(&cone(spokes, 0.05), &noisy)).expect("noise");
             smooth.positions[0].z
         };
         assert!(lift(64) < 0.045, "{}", lift(64));
-        // The ring is a border, which bends along itself: nothing is left that draws at the tip.
+        // The tip has no bending term of its own, and those of the ring, a border, do not contain it.
         assert!((lift(65) - 0.05).abs() < 1e-12, "{}", lift(65));
         let around_first = |spokes: u32| {
             let mesh = cone(spokes, 0.0);
-            Around::of(&mesh).two_rings(&mesh, 1)
+            Incidence::of(&mesh).two_rings(&mesh, 1)
         };
         assert_eq!(around_first(64).len(), 64, "all but itself");
         assert_eq!(around_first(65), [0, 2, 3, 64, 65]);
     }
 
     #[test]
-    fn meshes_without_inside_have_no_level() {
-        assert_eq!(noise_level(&TriMesh::default()), 0.0);
-        assert_eq!(denoised(&TriMesh::default()), None);
-        assert_eq!(noise_level(&holed_sheet(1, 0.0)), 0.0);
+    fn meshes_without_inner_vertices_have_no_noise_level() {
+        assert_eq!(level(&TriMesh::default()), 0.0);
+        assert_eq!(denoise(&TriMesh::default()), None);
+        assert_eq!(level(&holed_sheet(1, 0.0)), 0.0);
     }
 }

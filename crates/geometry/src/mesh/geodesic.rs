@@ -1,32 +1,29 @@
-//! Distances along the surface.
+//! Distance along the surface.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use super::topology::{Topology, next, previous};
+use super::index::VertexId;
+use super::topology::Topology;
 use super::{TriMesh, Vec3};
 
-/// Distance along the surface from the nearest source to every vertex, scene units; infinite where no path leads.
+/// Distance along the surface from the nearest source to every vertex, scene units; infinite beyond `limit` and where
+/// no path leads.
 ///
-/// Fast marching on the triangles (Kimmel & Sethian 1998): Dijkstra along edges, improved by letting a straight front cross each
-/// face. Never longer than the way along edges; within a few percent of the true distance on scan-like triangles. O(n log n).
-/// Sources that do not exist are ignored.
-pub fn geodesic_distance(mesh: &TriMesh, topology: &Topology, sources: &[u32]) -> Vec<f64> {
-    geodesic_distance_within(mesh, topology, sources, f64::INFINITY)
-}
-
-/// [`geodesic_distance`] as far as `limit`, infinite beyond; costs only what lies within.
-pub fn geodesic_distance_within(
+/// Fast marching on the triangles (Kimmel & Sethian 1998): Dijkstra along edges, improved by letting a straight front
+/// cross each face. Never longer than the shortest path along edges; within a few per cent of the true distance on
+/// scan-like triangles. O(n log n) in the vertices within `limit`. Sources that do not exist are ignored.
+pub(super) fn geodesic_distance(
     mesh: &TriMesh,
     topology: &Topology,
-    sources: &[u32],
+    sources: &[VertexId],
     limit: f64,
 ) -> Vec<f64> {
     let mut distance = vec![f64::INFINITY; mesh.positions.len()];
     let mut done = vec![false; mesh.positions.len()];
     let mut queue = BinaryHeap::new();
     for &s in sources {
-        if let Some(d) = distance.get_mut(s as usize) {
+        if let Some(d) = distance.get_mut(s.index()) {
             *d = 0.0;
             queue.push(Arrival {
                 distance: 0.0,
@@ -42,25 +39,26 @@ pub fn geodesic_distance_within(
         if arrived > limit {
             break;
         }
-        if std::mem::replace(&mut done[vertex as usize], true) {
+        if std::mem::replace(&mut done[vertex.index()], true) {
             continue;
         }
-        let from = distance[vertex as usize];
+        let from = distance[vertex.index()];
         for &h in topology.leaving(vertex) {
-            let (a, b) = (topology.from(next(h)), topology.from(previous(h)));
+            let (a, b) = (topology.target(h), topology.origin(h.previous()));
             for (goal, other) in [(a, b), (b, a)] {
-                if done[goal as usize] {
+                if done[goal.index()] {
                     continue;
                 }
-                let [here, there, p] = [vertex, other, goal].map(|v| mesh.positions[v as usize]);
+                let [here, there, p] = [vertex, other, goal].map(|v| mesh.positions[v.index()]);
                 let mut best = from + (p - here).norm();
-                if done[other as usize]
-                    && let Some(d) = front(here - p, there - p, from, distance[other as usize])
+                if done[other.index()]
+                    && let Some(d) =
+                        front_arrival(here - p, there - p, from, distance[other.index()])
                 {
                     best = best.min(d);
                 }
-                if best < distance[goal as usize] {
-                    distance[goal as usize] = best;
+                if best < distance[goal.index()] {
+                    distance[goal.index()] = best;
                     queue.push(Arrival {
                         distance: best,
                         vertex: goal,
@@ -77,9 +75,10 @@ pub fn geodesic_distance_within(
     distance
 }
 
-/// When a straight front that passes `a` at `ta` and `b` at `tb` (both seen from the third corner) reaches that corner,
-/// coming through the side between them; `None` when it comes from elsewhere.
-fn front(a: Vec3, b: Vec3, ta: f64, tb: f64) -> Option<f64> {
+/// The time at which a straight front of speed 1 reaches the third corner of a face, when it passes the other two at
+/// `ta` and `tb`; `a` and `b` are their positions relative to the third. `None` when the front does not come through
+/// the side between them.
+fn front_arrival(a: Vec3, b: Vec3, ta: f64, tb: f64) -> Option<f64> {
     // With E = [a b], Q = (EᵀE)⁻¹ the gradient is E Q (t − p·1); its length is 1.
     let (aa, ab, bb) = (a.dot(&a), a.dot(&b), b.dot(&b));
     let det = aa * bb - ab * ab;
@@ -98,11 +97,11 @@ fn front(a: Vec3, b: Vec3, ta: f64, tb: f64) -> Option<f64> {
     (q11 * da + q12 * db < 0.0 && q12 * da + q22 * db < 0.0).then_some(p)
 }
 
-/// A vertex in the queue; the nearest comes out first, among equals the lower-numbered.
+/// A vertex in the queue; the nearest is popped first, among equals the lower-numbered.
 #[derive(PartialEq)]
 struct Arrival {
     distance: f64,
-    vertex: u32,
+    vertex: VertexId,
 }
 
 impl Eq for Arrival {}
@@ -127,20 +126,20 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::mesh::shapes::{shaken, sheet};
+    use crate::mesh::shapes::{jitter, sheet};
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
 
         #[test]
         fn on_a_plane_it_is_the_straight_distance(n in 10usize..25, noise in 0.0..0.2f64, seed: u64, pick: prop::sample::Index) {
-            let mut mesh = shaken(&sheet(n, |_, _| true, |u, v| Vec3::new(u, v, 0.0)), noise / n as f64, seed);
+            let mut mesh = jitter(&sheet(n, |_, _| true, |u, v| Vec3::new(u, v, 0.0)), noise / n as f64, seed);
             for p in &mut mesh.positions {
                 p.z = 0.0;
             }
             let source = pick.index(mesh.positions.len());
             let topology = Topology::new(&mesh);
-            let distance = geodesic_distance(&mesh, &topology, &[source as u32]);
+            let distance = geodesic_distance(&mesh, &topology, &[VertexId(source as u32)], f64::INFINITY);
             for (p, d) in mesh.positions.iter().zip(&distance) {
                 let straight = (p - mesh.positions[source]).norm();
                 prop_assert!(*d > straight - 1e-9 - 0.02 * straight && *d < 1.15 * straight + 0.5 / n as f64, "{d} {straight}");
@@ -150,8 +149,8 @@ mod tests {
         #[test]
         fn a_straight_front_stays_straight(n in 4usize..16) {
             let mesh = sheet(n, |_, _| true, |u, v| Vec3::new(u, v, 0.0));
-            let sources: Vec<u32> = (0..=n as u32).collect();
-            let distance = geodesic_distance(&mesh, &Topology::new(&mesh), &sources);
+            let sources: Vec<VertexId> = (0..=n as u32).map(VertexId).collect();
+            let distance = geodesic_distance(&mesh, &Topology::new(&mesh), &sources, f64::INFINITY);
             for (p, d) in mesh.positions.iter().zip(&distance) {
                 prop_assert!((p.y - d).abs() < 1e-9);
             }
@@ -159,18 +158,19 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_reached_from_nowhere() {
+    fn without_a_source_nothing_is_reached() {
         let mesh = sheet(2, |_, _| true, |u, v| Vec3::new(u, v, 0.0));
-        let distance = geodesic_distance(&mesh, &Topology::new(&mesh), &[77]);
+        let distance =
+            geodesic_distance(&mesh, &Topology::new(&mesh), &[VertexId(77)], f64::INFINITY);
         assert!(distance.iter().all(|d| d.is_infinite()));
     }
 
     #[test]
-    fn a_limit_only_forgets_what_is_farther() {
+    fn a_limit_only_leaves_out_what_is_farther() {
         let mesh = sheet(12, |_, _| true, |u, v| Vec3::new(u, v, u * v));
         let topology = Topology::new(&mesh);
-        let all = geodesic_distance(&mesh, &topology, &[3]);
-        for (near, all) in geodesic_distance_within(&mesh, &topology, &[3], 0.4)
+        let all = geodesic_distance(&mesh, &topology, &[VertexId(3)], f64::INFINITY);
+        for (near, all) in geodesic_distance(&mesh, &topology, &[VertexId(3)], 0.4)
             .iter()
             .zip(all)
         {

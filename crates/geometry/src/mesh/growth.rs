@@ -1,50 +1,58 @@
-//! How a region is cut out of a mesh: faces within reach, less what hangs loose, plus what is enclosed.
+//! Which faces belong to a region of a given reach: faces near the rim, without islands, with the pockets they enclose.
 
 use super::TriMesh;
-use super::geodesic::geodesic_distance_within;
-use super::loops::{BoundaryLoop, LoopKind, walk};
-use super::region::Region;
-use super::topology::{NONE, Topology, corner_fans, previous};
+use super::geodesic::geodesic_distance;
+use super::index::{FaceId, HalfEdgeId, LoopId};
+use super::loops::{BoundaryLoop, LoopKind};
+use super::topology::Topology;
 
 /// The smallest reach tried, in mean edge lengths of the rim's faces.
 const NARROWEST: f64 = 3.0;
 /// A pocket whose depth exceeds this many reaches stays outside.
 const POCKET: f64 = 1.5;
+/// Rounds of dropping, filling and trimming. Each round settles only what the one before changed.
+const ROUNDS: usize = 8;
+/// "On no loop."
+const NO_LOOP: LoopId = LoopId(u32::MAX);
 
 /// What stays the same while the reach shrinks.
 pub(super) struct Growth<'a> {
-    mesh: &'a TriMesh,
-    topology: &'a Topology,
-    loops: &'a [BoundaryLoop],
-    rim: &'a BoundaryLoop,
-    /// Per vertex its distance from the rim, infinite beyond the deepest pocket.
-    pub(super) distance: Vec<f64>,
-    /// Per half-edge the loop it lies on, [`NONE`] inside.
-    loop_of: Vec<u32>,
-    /// Per face whether it touches the rim; such faces always belong.
+    /// The whole mesh.
+    pub mesh: &'a TriMesh,
+    /// Its topology.
+    pub topology: &'a Topology,
+    /// Its loops.
+    pub loops: &'a [BoundaryLoop],
+    /// The loop that the region surrounds.
+    pub rim: &'a BoundaryLoop,
+    /// Per vertex its distance from the rim, scene units; infinite beyond the deepest pocket.
+    pub distance: Vec<f64>,
+    /// The smallest reach to try, scene units.
+    pub narrowest: f64,
+    /// Per half-edge the loop it lies on, [`NO_LOOP`] inside.
+    loop_of: Vec<LoopId>,
+    /// Per face whether it touches the rim; such faces always belong to the region.
     touching: Vec<bool>,
-    /// The smallest reach to try.
-    pub(super) narrowest: f64,
 }
 
 impl<'a> Growth<'a> {
-    /// Measures the cloth round `rim` as far as regions of up to `reach` need it.
-    pub(super) fn new(
+    /// Measures the cloth around `rim` as far as regions of up to `reach` (scene units) need it.
+    pub fn new(
         mesh: &'a TriMesh,
         topology: &'a Topology,
         loops: &'a [BoundaryLoop],
         rim: &'a BoundaryLoop,
         reach: f64,
     ) -> Self {
-        let mut loop_of = vec![NONE; topology.twin.len()];
-        for (index, l) in loops.iter().enumerate() {
-            for &h in &l.half_edges {
-                loop_of[h as usize] = index as u32;
+        let mut loop_of = vec![NO_LOOP; 3 * mesh.faces.len()];
+        for l in loops {
+            for h in &l.half_edges {
+                loop_of[h.index()] = l.id;
             }
         }
         let mut touching = vec![false; mesh.faces.len()];
         for f in rim.vertices.iter().flat_map(|&v| topology.faces_at(v)) {
-            touching[f as usize] = true;
+            touching[f.index()] = true;
         }
         let (mut length, mut count) = (0.0, 0.0);
         for f in (0..mesh.faces.len()).filter(|&f| touching[f]) {
@@ -54,26 +62,26 @@ impl<'a> Growth<'a> {
         }
         let narrowest = NARROWEST * length / f64::max(count, 1.0);
         let limit = POCKET * reach.max(narrowest);
-        let distance = geodesic_distance_within(mesh, topology, &rim.vertices, limit);
+        let distance = geodesic_distance(mesh, topology, &rim.vertices, limit);
         Self {
             mesh,
             topology,
             loops,
             rim,
             distance,
+            narrowest,
             loop_of,
             touching,
-            narrowest,
         }
     }
 
-    /// The region of one reach, or its handles and outer loops when it is no disk.
-    pub(super) fn cut(&self, reach: f64) -> Result<Region, (usize, usize)> {
-        let mut inside: Vec<bool> = (0..self.mesh.faces.len())
-            .map(|f| self.touching[f] || self.depth(f) <= reach)
+    /// Per face of the whole mesh whether it belongs to the region of a reach.
+    pub fn inside(&self, reach: f64) -> Vec<bool> {
+        let mut inside: Vec<bool> = self
+            .faces()
+            .map(|f| self.touching[f.index()] || self.depth(f) <= reach)
             .collect();
-        // Each round can only settle what the one before stirred up; what is left after eight is split in `piece`.
-        for _ in 0..8 {
+        for _ in 0..ROUNDS {
             self.drop_islands(&mut inside);
             self.fill_pockets(&mut inside, POCKET * reach);
             if !self.trim_bow_ties(&mut inside) {
@@ -81,93 +89,101 @@ impl<'a> Growth<'a> {
             }
         }
         self.drop_islands(&mut inside);
-        self.piece(&inside, reach)
+        inside
+    }
+
+    /// The loop a half-edge of the whole mesh lies on, if any.
+    pub fn loop_at(&self, half_edge: HalfEdgeId) -> Option<&'a BoundaryLoop> {
+        self.loops.get(self.loop_of[half_edge.index()].index())
+    }
+
+    fn faces(&self) -> impl Iterator<Item = FaceId> + use<> {
+        (0..self.mesh.faces.len() as u32).map(FaceId)
     }
 
     /// Distance of the farthest corner of a face from the rim.
-    fn depth(&self, face: usize) -> f64 {
-        self.mesh.faces[face]
+    fn depth(&self, face: FaceId) -> f64 {
+        self.mesh.faces[face.index()]
             .iter()
             .map(|&v| self.distance[v as usize])
             .fold(0.0, f64::max)
     }
 
     /// The faces across the edges of a face.
-    fn beside(&self, face: u32) -> impl Iterator<Item = u32> + '_ {
-        let twins = &self.topology.twin[3 * face as usize..3 * face as usize + 3];
-        twins.iter().filter(|&&t| t != NONE).map(|t| t / 3)
+    fn beside(&self, face: FaceId) -> impl Iterator<Item = FaceId> {
+        let twins = face.half_edges().map(|h| self.topology.twin(h));
+        twins.into_iter().flatten().map(HalfEdgeId::face)
     }
 
-    /// Keeps only what hangs together with the faces at the rim.
+    /// Keeps only the faces that are connected with those at the rim.
     fn drop_islands(&self, inside: &mut [bool]) {
         let mut keep = vec![false; inside.len()];
-        let mut open: Vec<u32> = self.rim.half_edges.iter().map(|h| h / 3).collect();
-        open.retain(|&f| inside[f as usize]);
-        while let Some(f) = open.pop() {
-            if !std::mem::replace(&mut keep[f as usize], true) {
-                open.extend(self.beside(f).filter(|&g| inside[g as usize]));
+        let mut stack: Vec<FaceId> = self.rim.half_edges.iter().map(|h| h.face()).collect();
+        stack.retain(|f| inside[f.index()]);
+        while let Some(f) = stack.pop() {
+            if !std::mem::replace(&mut keep[f.index()], true) {
+                stack.extend(self.beside(f).filter(|g| inside[g.index()]));
             }
         }
         inside.copy_from_slice(&keep);
     }
 
-    /// Takes in pieces of the rest of the component that the region surrounds: no deeper than `limit` and bounded by the region and
+    /// Takes in pockets: connected pieces of the rest that are no deeper than `limit` and bounded by the region and
     /// holes alone.
     fn fill_pockets(&self, inside: &mut [bool], limit: f64) {
         let mut seen: Vec<bool> = inside.to_vec();
-        // A piece is given up at its first face that leads away; what is left of it is given up from there, too.
-        let mut away = vec![false; inside.len()];
-        for f in 0..inside.len() as u32 {
-            let at_border = !seen[f as usize] && self.beside(f).any(|g| inside[g as usize]);
+        // A piece is given up at its first face that stays outside; the rest of the piece is given up when it meets
+        // such a face.
+        let mut outside = vec![false; inside.len()];
+        for f in self.faces() {
+            let at_border = !seen[f.index()] && self.beside(f).any(|g| inside[g.index()]);
             if !at_border {
                 continue;
             }
             let (mut piece, mut next, mut lost) = (vec![f], 0, false);
-            seen[f as usize] = true;
+            seen[f.index()] = true;
             while next < piece.len() && !lost {
                 let g = piece[next];
                 next += 1;
-                lost = away[g as usize] || self.leads_away(g, limit);
+                lost = outside[g.index()] || self.stays_outside(g, limit);
                 for n in self.beside(g) {
-                    lost |= away[n as usize];
-                    if !std::mem::replace(&mut seen[n as usize], true) {
+                    lost |= outside[n.index()];
+                    if !std::mem::replace(&mut seen[n.index()], true) {
                         piece.push(n);
                     }
                 }
             }
-            for &g in &piece {
-                inside[g as usize] = !lost;
-                away[g as usize] = lost;
+            for g in &piece {
+                inside[g.index()] = !lost;
+                outside[g.index()] = lost;
             }
         }
     }
 
-    /// Whether a piece of the rest that contains this face stays outside whatever surrounds it.
-    fn leads_away(&self, face: u32, limit: f64) -> bool {
-        let face = face as usize;
-        self.depth(face) > limit || (3 * face..3 * face + 3).any(|h| self.is_open(h))
+    /// Whether a piece of the rest that contains this face is no pocket: too deep, or at a loop that is not a hole.
+    fn stays_outside(&self, face: FaceId, limit: f64) -> bool {
+        let at_open_loop =
+            |h: HalfEdgeId| (self.loop_at(h)).is_some_and(|l| l.kind != LoopKind::Hole);
+        self.depth(face) > limit || face.half_edges().into_iter().any(at_open_loop)
     }
 
-    /// Whether a half-edge lies on a loop of the whole mesh that is not a hole.
-    fn is_open(&self, half_edge: usize) -> bool {
-        self.loops
-            .get(self.loop_of[half_edge] as usize)
-            .is_some_and(|l| l.kind != LoopKind::Hole)
-    }
-
-    /// Takes out, at vertices where the region touches itself in a point, all fans but the largest; true when it took any.
+    /// At vertices where the region touches itself in a point, takes out all fans of faces but one; true when it took
+    /// any.
+    ///
+    /// A fan with a face at the rim is kept before others, then the largest. Faces at the rim are never taken out.
     fn trim_bow_ties(&self, inside: &mut [bool]) -> bool {
-        let across = |h: u32| match self.topology.twin[h as usize] {
-            t if t != NONE && inside[t as usize / 3] => t,
-            _ => NONE,
+        let across = |h: HalfEdgeId| {
+            let twin = self.topology.twin(h);
+            twin.filter(|t| inside[t.face().index()])
         };
+        let on_border = |h: HalfEdgeId| inside[h.face().index()] && across(h).is_none();
         // Every open fan has one half-edge of the region's boundary that leaves its vertex.
         let mut leaving = vec![0u8; self.mesh.positions.len()];
         let mut ties = Vec::new();
-        for h in 0..3 * inside.len() as u32 {
-            if inside[h as usize / 3] && across(h) == NONE {
-                let v = self.topology.from(h);
-                let count = &mut leaving[v as usize];
+        for h in self.faces().flat_map(FaceId::half_edges) {
+            if on_border(h) {
+                let v = self.topology.origin(h);
+                let count = &mut leaving[v.index()];
                 *count = count.saturating_add(1);
                 if *count == 2 {
                     ties.push(v);
@@ -175,114 +191,36 @@ impl<'a> Growth<'a> {
             }
         }
         ties.sort_unstable();
-        let mut taken: Vec<u32> = Vec::new();
+        let mut taken: Vec<FaceId> = Vec::new();
         for v in ties {
-            let mut fans: Vec<Vec<u32>> = Vec::new();
+            let mut fans: Vec<Vec<FaceId>> = Vec::new();
             for &h in self.topology.leaving(v) {
-                let starts = inside[h as usize / 3] && across(h) == NONE;
-                if starts {
-                    let round = |&e: &u32| Some(across(previous(e))).filter(|&t| t != NONE);
-                    let mut fan: Vec<u32> = std::iter::successors(Some(h), round)
-                        .map(|e| e / 3)
+                if on_border(h) {
+                    let around = |e: &HalfEdgeId| across(e.previous());
+                    let mut fan: Vec<FaceId> = std::iter::successors(Some(h), around)
+                        .map(HalfEdgeId::face)
                         .collect();
                     fan.sort_unstable();
                     fans.push(fan);
                 }
             }
-            // By its smallest face, so that the choice among equals depends on the mesh alone.
+            // By smallest face, so that the choice among equals depends on the mesh alone.
             fans.sort_unstable_by_key(|fan| fan.first().copied());
-            let weight = |fan: &Vec<u32>| {
-                let touching = fan.iter().any(|&f| self.touching[f as usize]);
+            let weight = |fan: &Vec<FaceId>| {
+                let touching = fan.iter().any(|f| self.touching[f.index()]);
                 (touching, fan.len())
             };
             let largest = fans.iter().map(weight).max();
             let kept = fans.iter().position(|fan| Some(weight(fan)) == largest);
             for (k, fan) in fans.iter().enumerate() {
                 if Some(k) != kept {
-                    taken.extend(fan.iter().filter(|&&f| !self.touching[f as usize]));
+                    taken.extend(fan.iter().filter(|f| !self.touching[f.index()]));
                 }
             }
         }
-        for &f in &taken {
-            inside[f as usize] = false;
+        for f in &taken {
+            inside[f.index()] = false;
         }
         !taken.is_empty()
-    }
-
-    /// The faces inside as a mesh of its own, if it is a disk once its holes are closed.
-    fn piece(&self, inside: &[bool], reach: f64) -> Result<Region, (usize, usize)> {
-        let faces: Vec<u32> = (0..inside.len() as u32)
-            .filter(|&f| inside[f as usize])
-            .collect();
-        let mut local = vec![NONE; inside.len()];
-        for (l, &f) in faces.iter().enumerate() {
-            local[f as usize] = l as u32;
-        }
-        let twin: Vec<u32> = faces
-            .iter()
-            .flat_map(|&f| 3 * f..3 * f + 3)
-            .map(|h| match self.topology.twin[h as usize] {
-                NONE => NONE,
-                t if inside[t as usize / 3] => 3 * local[t as usize / 3] + t % 3,
-                _ => NONE,
-            })
-            .collect();
-        let (fan, count) = corner_fans(&twin);
-        let origin = |l: u32| fan[l as usize];
-        let whole = |l: u32| 3 * faces[l as usize / 3] + l % 3;
-        let (mut rim, mut holes, mut rest) = (Vec::new(), Vec::new(), Vec::new());
-        for cycle in walk(&twin, origin) {
-            let first = cycle
-                .first()
-                .map_or(NONE, |&l| self.loop_of[whole(l) as usize]);
-            let uncut = cycle
-                .iter()
-                .all(|&l| self.loop_of[whole(l) as usize] == first);
-            let vertices: Vec<u32> = cycle.iter().map(|&l| origin(l)).collect();
-            match self.loops.get(first as usize).filter(|_| uncut) {
-                Some(l) if l.id == self.rim.id => {
-                    let start = self.rim.half_edges.first();
-                    let turn = cycle
-                        .iter()
-                        .position(|&l| Some(&whole(l)) == start)
-                        .unwrap_or(0);
-                    rim = vertices;
-                    rim.rotate_left(turn);
-                }
-                Some(l) if l.kind == LoopKind::Hole => holes.push(vertices),
-                _ => rest.push(vertices),
-            }
-        }
-        // χ = V − E + F = 2 − 2g − (loops); every edge has two half-edges or one and a boundary.
-        let boundary = twin.iter().filter(|&&t| t == NONE).count();
-        let loop_count = holes.len() + rest.len() + usize::from(!rim.is_empty());
-        let euler = count as i64 - (twin.len() + boundary) as i64 / 2 + faces.len() as i64;
-        let handles = ((2 - loop_count as i64 - euler) / 2).max(0) as usize;
-        let outer_count = rest.len();
-        let outer = match rest.pop() {
-            Some(outer) if rest.is_empty() && handles == 0 && !rim.is_empty() => outer,
-            _ => return Err((handles, outer_count)),
-        };
-        let mut vertices = vec![0; count];
-        for (l, &v) in fan.iter().enumerate() {
-            vertices[v as usize] = self.topology.from(whole(l as u32));
-        }
-        let positions = vertices
-            .iter()
-            .map(|&v| self.mesh.positions[v as usize])
-            .collect();
-        let (triangles, _) = fan.as_chunks::<3>();
-        Ok(Region {
-            mesh: TriMesh {
-                positions,
-                faces: triangles.to_vec(),
-            },
-            vertices,
-            faces,
-            rim,
-            holes,
-            outer,
-            reach,
-        })
     }
 }

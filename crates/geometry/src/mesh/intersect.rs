@@ -1,39 +1,50 @@
-//! Where a surface cuts through itself: a tree of boxes finds pairs of faces, exact predicates judge them.
+//! Where a surface cuts through itself: a tree of bounding boxes finds candidate pairs of faces, exact predicates
+//! decide.
 
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
-use super::boxes::{Bounds, Tree};
+use super::bounds::{BoundedFace, Bounds, BoxTree};
 use super::{TriMesh, Vec3};
 
 /// All pairs of faces `(f, g)`, `f < g`, that cut each other, ascending.
 ///
-/// Judged exactly on the given coordinates (Shewchuk's predicates). Faces that share one corner position count when they cut away from it;
-/// faces that share two do not count, even folded flat onto each other. In one plane, faces count when they overlap in an area. Elsewhere an edge
-/// must pass from one side of the other face's plane to the other: a corner that merely touches a face is no cut, two edges that cross in a
-/// point are. Faces with a position that is not finite are left out. O(n log n + pairs of overlapping boxes).
+/// Decided exactly on the given coordinates (Shewchuk 1997, adaptive predicates). O(n log n + pairs of overlapping
+/// boxes). What counts:
+///
+/// - Faces that share one corner position count when they cut away from it; faces that share two never count, even
+///   folded flat onto each other.
+/// - In one plane, faces count when they overlap in an area.
+/// - Otherwise an edge must pass from one side of the other face's plane to the other: a corner that only touches a
+///   face does not count, two edges that cross in a point do.
+/// - Faces with a position that is not finite do not count.
 pub fn self_intersections(mesh: &TriMesh) -> Vec<(u32, u32)> {
     let all: Vec<u32> = (0..mesh.faces.len() as u32).collect();
     intersections_with(mesh, &all)
 }
 
-/// Those pairs of [`self_intersections`] with at least one side in `faces` (each below `mesh.faces.len()`, others are ignored).
+/// Those pairs of [`self_intersections`] with at least one face in `faces`; indices of faces that do not exist are
+/// ignored.
 ///
-/// For a patch in a large scan: beyond the patch's bounding box it costs one comparison a face.
+/// Meant for a patch in a large scan: a face outside the bounding box of `faces` costs one comparison.
 pub fn intersections_with(mesh: &TriMesh, faces: &[u32]) -> Vec<(u32, u32)> {
     let mut asked = vec![false; mesh.faces.len()];
     let known = faces.iter().filter(|&&f| (f as usize) < mesh.faces.len());
     known.for_each(|&f| asked[f as usize] = true);
-    let boxed = |f: u32| Some((Bounds::of(mesh, f)?, f));
+    let bounded = |face: u32| {
+        let bounds = Bounds::of_face(mesh, face as usize)?;
+        Some(BoundedFace { bounds, face })
+    };
     let own = (0..mesh.faces.len() as u32).filter(|&f| asked[f as usize]);
-    let tree = Tree::new(own.filter_map(boxed).collect());
+    let tree = BoxTree::new(own.filter_map(bounded).collect());
     let Some(bounds) = tree.bounds() else {
         return Vec::new();
     };
     let mut pairs = Vec::new();
-    for (near, g) in (0..mesh.faces.len() as u32).filter_map(boxed) {
-        if near.meets(bounds) {
-            tree.meeting(&near, |f| {
-                // Of two faces asked for, each finds the other; once is enough.
+    for other in (0..mesh.faces.len() as u32).filter_map(bounded) {
+        if other.bounds.meets(bounds) {
+            let g = other.face;
+            tree.meeting(&other.bounds, |f| {
+                // Of two faces asked for, each finds the other; only one of the two counts.
                 let once = f < g || (f > g && !asked[g as usize]);
                 if once && cut(mesh, f, g) {
                     pairs.push((f.min(g), f.max(g)));
@@ -59,26 +70,26 @@ fn cut(mesh: &TriMesh, f: u32, g: u32) -> bool {
         a.rotate_left(i);
         b.rotate_left(j);
     }
-    // A shared corner comes first now, and lies in the other's plane.
+    // A shared corner is now the first one; it lies in the other face's plane.
     let own = usize::from(first.is_some());
-    let beside = |sides: &[i8; 3]| {
+    let on_one_side = |sides: &[i8; 3]| {
         sides[own..].iter().all(|&s| s > 0) || sides[own..].iter().all(|&s| s < 0)
     };
     let sides = |face: &[Vec3; 3], points: &[Vec3; 3]| {
         [0, 1, 2].map(|k| if k < own { 0 } else { side(face, points[k]) })
     };
     let a_sides = sides(&b, &a);
-    if beside(&a_sides) {
+    if on_one_side(&a_sides) {
         return false;
     }
     let b_sides = sides(&a, &b);
-    if beside(&b_sides) {
+    if on_one_side(&b_sides) {
         return false;
     }
     if a_sides == [0, 0, 0] || b_sides == [0, 0, 0] {
         return overlap_in_plane(&a, &b);
     }
-    // Edges at a shared corner lie on one side of it or touch, only the one opposite can pass through.
+    // Edges at a shared corner only touch the other face's plane there; the opposite edge alone can pass through it.
     let edges = if first.is_none() { 0..3 } else { 1..2 };
     edges.into_iter().any(|k| {
         let n = (k + 1) % 3;
@@ -139,7 +150,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::mesh::shapes::{holed_sheet, shaken, sheet, together, tube};
+    use crate::mesh::shapes::{concat, holed_sheet, jitter, sheet, tube};
     use crate::mesh::weld::weld;
 
     fn pair(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> TriMesh {
@@ -184,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn a_touch_is_no_cut() {
+    fn a_touch_does_not_count() {
         assert!(!cuts_floor([
             [1.0, 1.0, 0.0],
             [1.0, 2.0, 1.0],
@@ -246,12 +257,12 @@ mod tests {
         #[test]
         fn smooth_surfaces_do_not_cut_themselves(n in 4usize..16, noise in 0.0..0.1f64, seed: u64) {
             prop_assert_eq!(self_intersections(&holed_sheet(n, 0.2)), []);
-            prop_assert_eq!(self_intersections(&shaken(&weld(&tube(n, |_, _| true)).mesh, noise / n as f64, seed)), []);
+            prop_assert_eq!(self_intersections(&jitter(&weld(&tube(n, |_, _| true)).mesh, noise / n as f64, seed)), []);
         }
 
         #[test]
         fn the_tree_finds_what_all_pairs_find(seed: u64, n in 2usize..6) {
-            let tangle = shaken(&sheet(n, |_, _| true, |u, v| Vec3::new(u, v, 0.0)), 0.5, seed);
+            let tangle = jitter(&sheet(n, |_, _| true, |u, v| Vec3::new(u, v, 0.0)), 0.5, seed);
             let count = tangle.faces.len() as u32;
             let pairs = (0..count).flat_map(|f| (f + 1..count).map(move |g| (f, g)));
             let expected: Vec<(u32, u32)> = pairs.filter(|&(f, g)| cut(&tangle, f, g)).collect();
@@ -265,7 +276,7 @@ mod tests {
         fn crossing_sheets_cut_along_a_line(n in 3usize..12) {
             let floor = sheet(n, |_, _| true, |u, v| Vec3::new(u, v, 0.0));
             let wall = sheet(n, |_, _| true, |u, v| Vec3::new(0.47, 0.9 * u + 0.03, 1.01 * v - 0.52));
-            let found = self_intersections(&together(&floor, &wall));
+            let found = self_intersections(&concat(&floor, &wall));
             prop_assert!(found.len() >= 2 * n - 2, "{}", found.len());
             let faces = floor.faces.len() as u32;
             prop_assert!(found.iter().all(|&(f, g)| f < faces && g >= faces));

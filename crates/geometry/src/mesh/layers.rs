@@ -1,27 +1,29 @@
-//! Other layers of cloth about a hole: what a patch must not cut, though it is no part of the hole's region.
+//! Other layers of cloth near a hole: faces outside the hole's region that a patch must not cut.
 
 use std::collections::HashSet;
 
+use super::index::VertexId;
 use super::region::Region;
 use super::{TriMesh, Vec3};
 
-/// The faces of the whole mesh that are not a region's and come within `beyond` (scene units) of the box around its rim.
+/// The faces of the whole mesh outside `region` whose bounding boxes come within `margin` (scene units) of the rim's,
+/// as a mesh.
 ///
-/// A face that meets the rim in a point is left out: it touches the patch there and does not cut it.
-pub fn layers_near(whole: &TriMesh, region: &Region, beyond: f64) -> TriMesh {
+/// A face with a vertex on the rim is left out: it touches the patch there and does not cut it.
+pub fn layers_near(whole: &TriMesh, region: &Region, margin: f64) -> TriMesh {
     let rim = || (region.rim.iter()).map(|v| region.mesh.positions[*v as usize]);
-    let low = rim().fold(Vec3::repeat(f64::MAX), |m, p| m.inf(&p)) - Vec3::repeat(beyond);
-    let high = rim().fold(Vec3::repeat(f64::MIN), |m, p| m.sup(&p)) + Vec3::repeat(beyond);
+    let low = rim().fold(Vec3::repeat(f64::MAX), |m, p| m.inf(&p)) - Vec3::repeat(margin);
+    let high = rim().fold(Vec3::repeat(f64::MIN), |m, p| m.sup(&p)) + Vec3::repeat(margin);
     let mut own = vec![false; whole.faces.len()];
-    region.faces.iter().for_each(|f| own[*f as usize] = true);
-    let on_rim: HashSet<u32> = (region.rim.iter())
+    region.faces.iter().for_each(|f| own[f.index()] = true);
+    let on_rim: HashSet<VertexId> = (region.rim.iter())
         .map(|v| region.vertices[*v as usize])
         .collect();
     let near = |(face, own): &(&[u32; 3], bool)| {
         let [a, b, c] = face.map(|v| whole.positions[v as usize]);
         let (least, most) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));
         let apart = (0..3).any(|k| most[k] < low[k] || least[k] > high[k]);
-        !own && !apart && !face.iter().any(|v| on_rim.contains(v))
+        !own && !apart && !face.iter().any(|v| on_rim.contains(&VertexId(*v)))
     };
     let faces = whole.faces.iter().zip(own).filter(near);
     whole.part(faces.map(|(face, _)| *face))
@@ -32,25 +34,21 @@ mod tests {
     use super::*;
     use crate::mesh::loops::{LoopKind, boundary_loops};
     use crate::mesh::region::grow;
-    use crate::mesh::shapes::sheet;
+    use crate::mesh::shapes::{concat, sheet};
     use crate::mesh::topology::Topology;
     use crate::mesh::weld::weld;
 
     #[test]
     fn a_second_layer_is_near_and_the_rest_of_the_sheet_is_far() {
         let keep = |u: f64, v: f64| (u - 0.5).hypot(v - 0.5) > 0.1;
-        let mut soup = sheet(30, keep, |u, v| Vec3::new(u, v, 0.0));
+        let holed = sheet(30, keep, |u, v| Vec3::new(u, v, 0.0));
         let layer = sheet(30, |_, _| true, |u, v| Vec3::new(u, v, 0.05));
-        let (base, first) = (soup.positions.len() as u32, soup.faces.len());
-        soup.positions.extend(&layer.positions);
-        soup.faces
-            .extend(layer.faces.iter().map(|f| f.map(|v| base + v)));
-        let mesh = weld(&soup).mesh;
+        let mesh = weld(&concat(&holed, &layer)).mesh;
         let topology = Topology::new(&mesh);
         let loops = boundary_loops(&mesh, &topology);
-        let hole = loops.iter().position(|l| l.kind == LoopKind::Hole).unwrap();
-        let region = grow(&mesh, &topology, &loops, hole, 0.2).unwrap();
-        assert!(region.faces.len() < first);
+        let hole = loops.iter().find(|l| l.kind == LoopKind::Hole).unwrap();
+        let region = grow(&mesh, &topology, &loops, hole.id, 0.2).unwrap();
+        assert!(region.faces.len() < holed.faces.len());
 
         let near = layers_near(&mesh, &region, 0.06);
         let above = |p: &&Vec3| p.z > 0.0;

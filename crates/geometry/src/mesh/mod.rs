@@ -1,22 +1,27 @@
 //! Triangle meshes as plain arrays: welding, topology, boundary loops, regions, self-intersection, curvature.
-//! Small free functions on `TriMesh`, one idea a file; everything is in scene units and f64.
-//! No glTF, no charts, no grids, no files: those rooms stand on this one.
+//!
+//! Small free functions on [`TriMesh`], one idea a file, in scene units and f64. This module knows no charts and no
+//! grids.
+//!
+//! From a triangle soup to a hole's surroundings: [`weld::weld`] → [`topology::Topology`] → [`loops::boundary_loops`]
+//! → [`region::grow`].
 
-mod boxes;
-mod collar;
+pub(crate) mod bounds;
 pub mod curvature;
 pub mod denoise;
-pub mod geodesic;
+mod geodesic;
 mod growth;
+pub mod index;
 pub mod intersect;
 pub mod layers;
 pub mod loops;
 pub mod nearest;
+mod pairing;
 pub mod region;
-pub mod topology;
-pub mod weld;
-
 pub mod shapes;
+pub mod topology;
+pub mod turning;
+pub mod weld;
 
 use std::collections::HashMap;
 
@@ -38,12 +43,13 @@ impl TriMesh {
     /// The three corner positions of a face.
     ///
     /// # Panics
-    /// When `face` or one of its vertices does not exist; welded meshes and regions keep both in range.
+    /// When `face` or one of its vertices does not exist.
+    #[inline]
     pub fn triangle(&self, face: usize) -> [Vec3; 3] {
         self.faces[face].map(|v| self.positions[v as usize])
     }
 
-    /// The mesh of some of its faces, with the vertices they use, in the order of first use.
+    /// The given faces as a mesh, with the vertices they use, in the order of first use.
     pub fn part(&self, faces: impl IntoIterator<Item = [u32; 3]>) -> TriMesh {
         let mut index = HashMap::new();
         let mut part = TriMesh::default();
@@ -71,7 +77,8 @@ impl TriMesh {
     }
 }
 
-/// What to divide lengths of this size by so that their products neither overflow nor vanish: 1 for any size met outside attacks.
+/// A unit for lengths of this size, so that their products neither overflow nor underflow: 1 for all sizes but
+/// extreme ones.
 fn unit_for(size: f64) -> f64 {
     if size == 0.0 || (1e-100..1e100).contains(&size) {
         1.0

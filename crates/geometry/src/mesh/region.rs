@@ -2,25 +2,31 @@
 
 use super::TriMesh;
 use super::growth::Growth;
-use super::loops::BoundaryLoop;
+use super::index::{FaceId, HalfEdgeId, LoopId, VertexId};
+use super::loops::{BoundaryLoop, LoopKind};
+use super::pairing::Twins;
 use super::topology::Topology;
 
 /// A piece of the mesh around one hole, as a mesh of its own.
+///
+/// Plain numbers index the region's own mesh; [`VertexId`] and [`FaceId`] index the whole mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Region {
     /// The piece as scanned; every boundary vertex lies on exactly one of its loops.
     pub mesh: TriMesh,
-    /// Local vertex -> vertex of the whole mesh. A vertex where the piece touches itself only in a point appears twice.
-    pub vertices: Vec<u32>,
-    /// Local face -> face of the whole mesh, ascending.
-    pub faces: Vec<u32>,
-    /// Local vertices of the hole asked for, in its loop's order.
+    /// Per vertex of the piece its vertex of the whole mesh. A vertex where the piece touches itself only in a point
+    /// appears twice.
+    pub vertices: Vec<VertexId>,
+    /// Per face of the piece its face of the whole mesh, ascending.
+    pub faces: Vec<FaceId>,
+    /// Vertices of the piece along the hole asked for, in its loop's order.
     pub rim: Vec<u32>,
     /// The other holes that lie wholly inside, each along its half-edges.
     pub holes: Vec<Vec<u32>>,
     /// The one outer loop, along its half-edges; may follow loops of the whole mesh where the piece is cut by them.
     pub outer: Vec<u32>,
-    /// The reach that was used, scene units: the one asked for unless that was less than three edges, more than there is, or no disk.
+    /// The reach that was used, scene units: the one asked for unless that was below three edges, beyond the mesh, or
+    /// gave no disk.
     pub reach: f64,
 }
 
@@ -30,8 +36,8 @@ pub enum RegionError {
     /// The rim asked for is not among the loops.
     #[error("loop {rim} does not exist; the mesh has {loops} boundary loop(s)")]
     NoSuchLoop {
-        /// The index asked for.
-        rim: usize,
+        /// The loop asked for.
+        rim: LoopId,
         /// How many loops there are.
         loops: usize,
     },
@@ -40,21 +46,21 @@ pub enum RegionError {
         "a coordinate of the cloth round loop {rim} is {coordinate:e}; at most {limit:e} can be measured"
     )]
     TooLarge {
-        /// Id of the rim.
-        rim: u32,
+        /// The rim.
+        rim: LoopId,
         /// The largest coordinate.
         coordinate: f64,
         /// The largest allowed.
         limit: f64,
     },
-    /// Even three edges wide the cloth round the rim is no disk.
+    /// Even three edges wide the cloth around the rim is no disk.
     #[error(
         "the cloth within {reach:.4} of loop {rim} has {handles} handle(s) and {outer} outer loop(s); \
          it must be a disk with one outer loop once its holes are closed"
     )]
     NotADisk {
-        /// Id of the rim.
-        rim: u32,
+        /// The rim.
+        rim: LoopId,
         /// Handles (genus) of the piece.
         handles: usize,
         /// Loops that are not holes; should be 1.
@@ -66,25 +72,26 @@ pub enum RegionError {
 
 /// What the reach is multiplied by when the piece is no disk.
 const SHRINK: f64 = 0.8;
-/// Largest coordinate that a region may have: its cube is a number still.
+/// Largest coordinate that a region may have, scene units: its cube does not overflow.
 const LARGEST: f64 = 1e100;
 
 /// The cloth within geodesic distance `reach` (scene units; infinite for all there is) of loop `rim`, made a disk.
 ///
-/// Pieces that the region encloses are filled back in when they are shallow, islands are dropped. When what is left is
-/// not a disk once its holes are closed (it wraps round a sleeve, or meets itself behind a fold), the reach shrinks in steps down to about
-/// three edges, which is also the least it starts from. Other hole loops wholly inside become `holes`; those the border cuts become part of `outer`.
+/// Shallow pieces that the region encloses are filled in, islands are dropped. When the rest is not a disk once its
+/// holes are closed (it wraps around a sleeve, or meets itself behind a fold), the reach shrinks in steps down to
+/// about three edges, which is also the least it starts from. Other hole loops wholly inside become `holes`; those
+/// that the border cuts become part of `outer`.
 ///
 /// # Errors
-/// When the rim does not exist, its coordinates are beyond measure, or no reach gives a disk.
+/// When the rim does not exist, a coordinate exceeds 10¹⁰⁰, or no reach gives a disk.
 pub fn grow(
     mesh: &TriMesh,
     topology: &Topology,
     loops: &[BoundaryLoop],
-    rim: usize,
+    rim: LoopId,
     reach: f64,
 ) -> Result<Region, RegionError> {
-    let Some(asked) = loops.get(rim) else {
+    let Some(asked) = loops.get(rim.index()) else {
         return Err(RegionError::NoSuchLoop {
             rim,
             loops: loops.len(),
@@ -102,7 +109,7 @@ pub fn grow(
     let mut reach = reach.min(farthest);
     loop {
         reach = reach.max(narrowest);
-        let (handles, outer) = match growth.cut(reach) {
+        let shape = match cut_out(&growth, reach) {
             Ok(region) => {
                 small_enough(mesh, asked, &region.vertices)?;
                 return Ok(region);
@@ -112,8 +119,8 @@ pub fn grow(
         if reach <= narrowest {
             return Err(RegionError::NotADisk {
                 rim: asked.id,
-                handles,
-                outer,
+                handles: shape.handles,
+                outer: shape.outer,
                 reach,
             });
         }
@@ -121,8 +128,12 @@ pub fn grow(
     }
 }
 
-fn small_enough(mesh: &TriMesh, rim: &BoundaryLoop, vertices: &[u32]) -> Result<(), RegionError> {
-    let sizes = vertices.iter().map(|&v| mesh.positions[v as usize].amax());
+fn small_enough(
+    mesh: &TriMesh,
+    rim: &BoundaryLoop,
+    vertices: &[VertexId],
+) -> Result<(), RegionError> {
+    let sizes = vertices.iter().map(|v| mesh.positions[v.index()].amax());
     let coordinate = sizes.fold(0.0, f64::max);
     if coordinate <= LARGEST {
         return Ok(());
@@ -134,6 +145,94 @@ fn small_enough(mesh: &TriMesh, rim: &BoundaryLoop, vertices: &[u32]) -> Result<
     })
 }
 
+/// The topology of a piece that is no disk.
+struct Shape {
+    /// Handles (genus).
+    handles: usize,
+    /// Loops that are not holes.
+    outer: usize,
+}
+
+/// The faces within a reach as a mesh of its own, if it is a disk once its holes are closed.
+fn cut_out(growth: &Growth, reach: f64) -> Result<Region, Shape> {
+    let Growth { mesh, topology, .. } = *growth;
+    let inside = growth.inside(reach);
+    let faces: Vec<FaceId> = (0..inside.len() as u32)
+        .map(FaceId)
+        .filter(|f| inside[f.index()])
+        .collect();
+    let mut local = vec![u32::MAX; inside.len()];
+    for (l, f) in (0u32..).zip(&faces) {
+        local[f.index()] = l;
+    }
+    let to_local = |whole: HalfEdgeId| {
+        let face = FaceId(local[whole.face().index()]);
+        face.half_edges()[whole.corner()]
+    };
+    let to_whole = |local: HalfEdgeId| faces[local.face().index()].half_edges()[local.corner()];
+    let twins: Twins = faces
+        .iter()
+        .flat_map(|f| f.half_edges())
+        .map(|h| {
+            let twin = topology.twin(h).filter(|t| inside[t.face().index()]);
+            twin.map(to_local)
+        })
+        .collect();
+    let (fan, count) = twins.corner_fans();
+    let origin = |local: HalfEdgeId| VertexId(fan[local.index()]);
+    let (mut rim, mut holes, mut rest) = (Vec::new(), Vec::new(), Vec::new());
+    for cycle in twins.boundary_cycles(origin) {
+        let loop_at = |&l: &HalfEdgeId| growth.loop_at(to_whole(l));
+        let first = cycle.first().and_then(loop_at);
+        let is_whole_loop = (cycle.iter()).all(|l| loop_at(l).map(|l| l.id) == first.map(|l| l.id));
+        let vertices: Vec<u32> = cycle.iter().map(|&l| origin(l).0).collect();
+        match first.filter(|_| is_whole_loop) {
+            Some(l) if l.id == growth.rim.id => {
+                let start = growth.rim.half_edges.first();
+                let shift = cycle
+                    .iter()
+                    .position(|&l| Some(&to_whole(l)) == start)
+                    .unwrap_or(0);
+                rim = vertices;
+                rim.rotate_left(shift);
+            }
+            Some(l) if l.kind == LoopKind::Hole => holes.push(vertices),
+            _ => rest.push(vertices),
+        }
+    }
+    // χ = V − E + F = 2 − 2g − (loops); every edge has two half-edges or one and a boundary.
+    let boundary = twins.boundary().count();
+    let loop_count = holes.len() + rest.len() + usize::from(!rim.is_empty());
+    let euler = count as i64 - (twins.len() + boundary) as i64 / 2 + faces.len() as i64;
+    let handles = ((2 - loop_count as i64 - euler) / 2).max(0) as usize;
+    let shape = Shape {
+        handles,
+        outer: rest.len(),
+    };
+    let outer = match rest.pop() {
+        Some(outer) if rest.is_empty() && handles == 0 && !rim.is_empty() => outer,
+        _ => return Err(shape),
+    };
+    let mut vertices = vec![VertexId(0); count];
+    for (l, &v) in (0u32..).map(HalfEdgeId).zip(&fan) {
+        vertices[v as usize] = topology.origin(to_whole(l));
+    }
+    let positions = vertices.iter().map(|v| mesh.positions[v.index()]).collect();
+    let (triangles, _) = fan.as_chunks::<3>();
+    Ok(Region {
+        mesh: TriMesh {
+            positions,
+            faces: triangles.to_vec(),
+        },
+        vertices,
+        faces,
+        rim,
+        holes,
+        outer,
+        reach,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -141,7 +240,7 @@ mod tests {
     use super::*;
     use crate::mesh::Vec3;
     use crate::mesh::loops::{LoopKind, boundary_loops};
-    use crate::mesh::shapes::{holed_sheet, shaken, sheet, tube};
+    use crate::mesh::shapes::{holed_sheet, jitter, sheet, tube};
     use crate::mesh::weld::weld;
 
     struct Whole {
@@ -162,30 +261,35 @@ mod tests {
             }
         }
 
-        fn hole(&self) -> usize {
-            self.loops
-                .iter()
-                .position(|l| l.kind == LoopKind::Hole)
-                .expect("the shape has a hole")
+        fn hole(&self) -> &BoundaryLoop {
+            let mut loops = self.loops.iter();
+            let hole = loops.find(|l| l.kind == LoopKind::Hole);
+            hole.expect("the shape has a hole")
         }
 
         fn grow(&self, reach: f64) -> Result<Region, RegionError> {
-            grow(&self.mesh, &self.topology, &self.loops, self.hole(), reach)
+            grow(
+                &self.mesh,
+                &self.topology,
+                &self.loops,
+                self.hole().id,
+                reach,
+            )
         }
     }
 
-    /// What must hold of every region: a manifold disk with holes whose rim and faces are the whole mesh's own.
+    /// What holds for every region: it is a manifold disk with holes whose rim and faces are those of the whole mesh.
     fn check(whole: &Whole, region: &Region) -> Result<(), TestCaseError> {
-        let rim: Vec<u32> = region
+        let rim: Vec<VertexId> = region
             .rim
             .iter()
             .map(|&v| region.vertices[v as usize])
             .collect();
-        prop_assert_eq!(&rim, &whole.loops[whole.hole()].vertices);
-        for (l, &f) in region.faces.iter().enumerate() {
+        prop_assert_eq!(&rim, &whole.hole().vertices);
+        for (l, f) in region.faces.iter().enumerate() {
             prop_assert_eq!(
-                region.mesh.faces[l].map(|v| region.vertices[v as usize]),
-                whole.mesh.faces[f as usize]
+                region.mesh.faces[l].map(|v| region.vertices[v as usize].0),
+                whole.mesh.faces[f.index()]
             );
         }
         let topology = Topology::new(&region.mesh);
@@ -193,6 +297,7 @@ mod tests {
         let mut found: Vec<u32> = boundary_loops(&region.mesh, &topology)
             .into_iter()
             .flat_map(|l| l.vertices)
+            .map(|v| v.0)
             .collect();
         let loops = 2 + region.holes.len();
         let mut told: Vec<u32> = region
@@ -208,7 +313,7 @@ mod tests {
         prop_assert_eq!(&found, &told);
         told.dedup();
         prop_assert_eq!(told.len(), found.len());
-        let edges = topology.edges().count();
+        let edges = (3 * region.faces.len() + topology.twins().boundary().count()) / 2;
         let euler = region.mesh.positions.len() as i64 - edges as i64 + region.faces.len() as i64;
         prop_assert_eq!(euler, 2 - loops as i64);
         Ok(())
@@ -220,18 +325,18 @@ mod tests {
         #[test]
         fn regions_of_rough_cloth_are_disks_with_holes(
             n in 12usize..28, reach in 0.0..1.0f64, noise in 0.0..0.4f64, seed: u64,
-            moths in prop::collection::vec((0.05..0.95f64, 0.05..0.95f64, 0.02..0.08f64), 0..6),
+            small_holes in prop::collection::vec((0.05..0.95f64, 0.05..0.95f64, 0.02..0.08f64), 0..6),
         ) {
             let keep = |u: f64, v: f64| {
-                (u - 0.5).hypot(v - 0.5) > 0.2 && moths.iter().all(|m| (u - m.0).hypot(v - m.1) > m.2)
+                (u - 0.5).hypot(v - 0.5) > 0.2 && small_holes.iter().all(|m| (u - m.0).hypot(v - m.1) > m.2)
             };
             let bumps = |u: f64, v: f64| Vec3::new(u, v, 0.15 * (9.0 * u).sin() * (7.0 * v).cos());
-            let whole = Whole::new(&shaken(&sheet(n, keep, bumps), noise / n as f64, seed));
-            // Moths may eat their way from the hole to the border.
+            let whole = Whole::new(&jitter(&sheet(n, keep, bumps), noise / n as f64, seed));
+            // The small holes may connect the hole with the border.
             prop_assume!(whole.loops.iter().any(|l| l.kind == LoopKind::Hole));
-            let rough = whole.grow(reach);
-            prop_assert!(rough.is_ok(), "{:?}", rough.map(|_| ()));
-            check(&whole, &rough.expect("a region"))?;
+            let region = whole.grow(reach);
+            prop_assert!(region.is_ok(), "{:?}", region.map(|_| ()));
+            check(&whole, &region.expect("a region"))?;
         }
 
         #[test]
@@ -241,7 +346,7 @@ mod tests {
             check(&whole, &region)?;
             prop_assert_eq!(region.reach, reach);
             prop_assert!(region.holes.is_empty());
-            let rim = &whole.loops[whole.hole()];
+            let rim = whole.hole();
             let outside = |p: &Vec3| crate::mesh::nearest::distance_to_loop(&whole.mesh, rim, p);
             let edge = 1.5 / n as f64;
             for p in &region.mesh.positions {
@@ -260,7 +365,7 @@ mod tests {
         let whole = Whole::new(&holed_sheet(12, 0.2));
         let region = whole.grow(f64::INFINITY).expect("a flat ring");
         assert_eq!(region.faces.len(), whole.mesh.faces.len());
-        let outer: Vec<u32> = region
+        let outer: Vec<VertexId> = region
             .outer
             .iter()
             .map(|&v| region.vertices[v as usize])
@@ -277,17 +382,17 @@ mod tests {
     }
 
     #[test]
-    fn a_band_round_a_tube_shrinks_to_a_disk() {
+    fn a_band_around_a_tube_shrinks_to_a_disk() {
         let whole = Whole::new(&tube(40, |u, v| {
             (u - 0.5).abs() > 0.1 || (v - 0.5).abs() > 0.06
         }));
-        let region = whole.grow(3.5).expect("cloth round a small hole");
+        let region = whole.grow(3.5).expect("cloth around a small hole");
         assert!(region.reach < 3.1, "{}", region.reach);
         assert!(check(&whole, &region).is_ok());
     }
 
     #[test]
-    fn a_hole_all_but_round_a_tube_is_refused_with_numbers() {
+    fn a_hole_nearly_all_around_a_tube_is_refused_with_numbers() {
         let whole = Whole::new(&tube(12, |u, v| {
             !(0.05..0.95).contains(&u) || (v - 0.5).abs() > 0.06
         }));
@@ -306,7 +411,7 @@ mod tests {
     }
 
     #[test]
-    fn coordinates_beyond_measure_are_refused_with_numbers() {
+    fn coordinates_too_large_to_measure_are_refused_with_numbers() {
         let mut huge = holed_sheet(12, 0.2);
         huge.positions.iter_mut().for_each(|p| *p *= 1e200);
         let refused = Whole::new(&huge).grow(1e199);
@@ -317,9 +422,15 @@ mod tests {
     }
 
     #[test]
-    fn a_loop_that_is_not_there_is_named() {
+    fn a_loop_that_does_not_exist_is_named() {
         let whole = Whole::new(&holed_sheet(8, 0.2));
-        let missing = grow(&whole.mesh, &whole.topology, &whole.loops, 7, 1.0);
-        assert_eq!(missing, Err(RegionError::NoSuchLoop { rim: 7, loops: 2 }));
+        let missing = grow(&whole.mesh, &whole.topology, &whole.loops, LoopId(7), 1.0);
+        assert_eq!(
+            missing,
+            Err(RegionError::NoSuchLoop {
+                rim: LoopId(7),
+                loops: 2
+            })
+        );
     }
 }

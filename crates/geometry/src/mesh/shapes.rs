@@ -1,4 +1,7 @@
-//! Simple surfaces with known answers, for tests, benchmarks and examples.
+//! Simple surfaces with known geometry, and changes to meshes with known effects: for tests, benchmarks and examples.
+//!
+//! Lengths are scene units. Shapes are triangle soups as a file might hold them: [`weld`](super::weld::weld) them
+//! first. Everything random is determined by its seed.
 
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -8,8 +11,11 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{TriMesh, Vec3};
 
-/// An `n` × `n` grid of squares, two triangles each, over [0, 1]² as (u, v), bent by `place`; squares whose middle `keep` refuses
-/// are left out. Unused vertices stay.
+/// An `n` × `n` grid of squares, two triangles each, over (u, v) in [0, 1]²; `place` gives the position of a grid
+/// point, in scene units.
+///
+/// Squares for whose middle `keep` is false are left out; their vertices stay, used or not. Vertex `j * (n + 1) + i`
+/// is the grid point (i / n, j / n).
 pub fn sheet(
     n: usize,
     keep: impl Fn(f64, f64) -> bool,
@@ -31,7 +37,7 @@ pub fn sheet(
     TriMesh { positions, faces }
 }
 
-/// A unit square in the plane z = 0 with a round hole of radius `hole` in its middle.
+/// A flat square of side 1 in the plane z = 0 with a round hole of radius `hole` in its middle; `n` squares a side.
 pub fn holed_sheet(n: usize, hole: f64) -> TriMesh {
     sheet(
         n,
@@ -40,8 +46,10 @@ pub fn holed_sheet(n: usize, hole: f64) -> TriMesh {
     )
 }
 
-/// A tube of radius 1 and length 4, `n` squares around and long; squares for which `keep(angle / 2π, height / 4)` fails are left out.
-/// The positions close up exactly; the seam is two columns of vertices.
+/// A tube of radius 1 and length 4 along z, `n` rectangles around and along; those for which `keep(angle / 2π, height
+/// / 4)` is false are left out.
+///
+/// The two columns of vertices at the seam have equal positions, so welding closes it.
 pub fn tube(n: usize, keep: impl Fn(f64, f64) -> bool) -> TriMesh {
     sheet(n, keep, |u, v| {
         let angle = if u == 1.0 { 0.0 } else { u * TAU };
@@ -49,8 +57,9 @@ pub fn tube(n: usize, keep: impl Fn(f64, f64) -> bool) -> TriMesh {
     })
 }
 
-/// Shifts every position (equal positions alike) by up to `amount` in each direction.
-pub fn shaken(mesh: &TriMesh, amount: f64, seed: u64) -> TriMesh {
+/// The mesh with every coordinate shifted at random by up to `amount`, scene units; equal positions are shifted
+/// equally.
+pub fn jitter(mesh: &TriMesh, amount: f64, seed: u64) -> TriMesh {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut shifts: HashMap<[u64; 3], Vec3> = HashMap::new();
     let positions = mesh.positions.iter().map(|p| {
@@ -65,8 +74,8 @@ pub fn shaken(mesh: &TriMesh, amount: f64, seed: u64) -> TriMesh {
     }
 }
 
-/// The same triangles with vertices in another order.
-pub fn shuffled(mesh: &TriMesh, seed: u64) -> TriMesh {
+/// The same triangles with the vertices in a random order.
+pub fn shuffle(mesh: &TriMesh, seed: u64) -> TriMesh {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut order: Vec<usize> = (0..mesh.positions.len()).collect();
     for i in (1..order.len()).rev() {
@@ -86,8 +95,8 @@ pub fn shuffled(mesh: &TriMesh, seed: u64) -> TriMesh {
     }
 }
 
-/// The same triangles, none sharing a vertex.
-pub fn exploded(mesh: &TriMesh) -> TriMesh {
+/// The same triangles, each with three vertices of its own.
+pub fn explode(mesh: &TriMesh) -> TriMesh {
     TriMesh {
         positions: mesh
             .faces
@@ -101,8 +110,8 @@ pub fn exploded(mesh: &TriMesh) -> TriMesh {
     }
 }
 
-/// Both meshes as one.
-pub fn together(a: &TriMesh, b: &TriMesh) -> TriMesh {
+/// Both meshes as one: the faces and vertices of `b` follow those of `a`.
+pub fn concat(a: &TriMesh, b: &TriMesh) -> TriMesh {
     let shift = a.positions.len() as u32;
     TriMesh {
         positions: a.positions.iter().chain(&b.positions).copied().collect(),

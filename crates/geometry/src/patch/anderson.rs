@@ -1,36 +1,42 @@
-//! Anderson acceleration of a fixed-point iteration on vertex positions (Peng et al. 2018, "Anderson acceleration for geometry
-//! optimization and physics simulation"): the next point is the combination of the last few steps whose residuals cancel best.
+//! Anderson acceleration (mixing) of a fixed-point iteration x ← g(x) on vertex positions, after Peng et al. 2018,
+//! "Anderson acceleration for geometry optimization and physics simulation": the next point is the combination of the
+//! last few images g(x) whose residuals g(x) − x cancel best (least squares).
 
 use nalgebra::{SMatrix, SVector};
 
 use crate::mesh::Vec3;
 
-/// Steps remembered.
+/// Most differences of rounds that are kept.
 const WINDOW: usize = 6;
-/// A residual that grows by more than this factor empties the memory.
+/// A residual that grows by more than this factor discards all that is kept.
 const GROWN: f64 = 1.5;
 
-/// The memory of an accelerated iteration x ← g(x).
-pub(super) struct Anderson {
-    /// Differences of consecutive residuals g(x) − x, and of consecutive g(x); the oldest is overwritten.
+/// What an accelerated iteration x ← g(x) keeps of its last rounds.
+pub(super) struct AndersonMixing {
+    /// Differences of consecutive residuals g(x) − x; the oldest is overwritten.
     residuals: Vec<Vec<f64>>,
-    steps: Vec<Vec<f64>>,
+    /// Differences of consecutive images g(x), in the same order.
+    images: Vec<Vec<f64>>,
     /// Scalar products of the residual differences.
     gram: SMatrix<f64, WINDOW, WINDOW>,
-    /// Residual and g(x) of the round before.
+    /// Residual and image of the round before.
     last: Option<(Vec<f64>, Vec<f64>)>,
+    /// Squared norm of the last residual.
     length: f64,
+    /// How many differences count.
     used: usize,
+    /// Where the next difference goes.
     next: usize,
+    /// Numbers in a vector.
     size: usize,
 }
 
-impl Anderson {
-    /// Nothing remembered, for vectors of `size` numbers.
-    pub fn new(size: usize) -> Anderson {
-        Anderson {
+impl AndersonMixing {
+    /// The start of an iteration on vectors of `size` numbers.
+    pub fn new(size: usize) -> AndersonMixing {
+        AndersonMixing {
             residuals: Vec::new(),
-            steps: Vec::new(),
+            images: Vec::new(),
             gram: SMatrix::zeros(),
             last: None,
             length: f64::INFINITY,
@@ -40,12 +46,13 @@ impl Anderson {
         }
     }
 
-    /// Replaces x, the first vertices of `positions`, by the next point, given g(x); the largest |g(x) − x| of a vertex.
-    pub fn advance(&mut self, positions: &mut [Vec3], step: &[[f64; 3]]) -> f64 {
-        let image = &step.as_flattened()[..self.size];
+    /// Replaces x, the first vertices of `positions`, by the next point, given `image` = g(x); returns the largest
+    /// |g(x) − x| of a vertex.
+    pub fn advance(&mut self, positions: &mut [Vec3], image: &[[f64; 3]]) -> f64 {
+        let flat_image = &image.as_flattened()[..self.size];
         let mut residual = Vec::with_capacity(self.size);
         let mut farthest = 0.0f64;
-        for (p, q) in positions.iter().zip(step) {
+        for (p, q) in positions.iter().zip(image) {
             let d = Vec3::from(*q) - p;
             farthest = farthest.max(d.norm_squared());
             residual.extend_from_slice(d.as_slice());
@@ -56,29 +63,33 @@ impl Anderson {
         }
         self.length = length;
         if let Some((old, old_image)) = self.last.take() {
-            self.remember(difference(&residual, old), difference(image, old_image));
+            self.remember(
+                difference(&residual, old),
+                difference(flat_image, old_image),
+            );
         }
-        for (p, x) in positions.iter_mut().zip(step) {
+        for (p, x) in positions.iter_mut().zip(image) {
             *p = Vec3::from(*x);
         }
         let shares = self.shares(&residual);
-        for (share, d) in shares.iter().zip(&self.steps).take(self.used) {
+        for (share, d) in shares.iter().zip(&self.images).take(self.used) {
             for (p, d) in positions.iter_mut().zip(d.as_chunks::<3>().0) {
                 *p -= Vec3::from(*d) * *share;
             }
         }
-        self.last = Some((residual, image.to_vec()));
+        self.last = Some((residual, flat_image.to_vec()));
         farthest.sqrt()
     }
 
-    fn remember(&mut self, residual: Vec<f64>, step: Vec<f64>) {
+    /// Keeps the differences of a round, in the place of the oldest where there are enough.
+    fn remember(&mut self, residual: Vec<f64>, image: Vec<f64>) {
         let place = self.next;
         if place < self.residuals.len() {
             self.residuals[place] = residual;
-            self.steps[place] = step;
+            self.images[place] = image;
         } else {
             self.residuals.push(residual);
-            self.steps.push(step);
+            self.images.push(image);
         }
         self.next = (place + 1) % WINDOW;
         self.used = (self.used + 1).min(WINDOW);
@@ -89,7 +100,7 @@ impl Anderson {
         }
     }
 
-    /// Shares of the remembered differences that cancel the residual best (least squares); zeros when they say nothing.
+    /// Shares of the differences that cancel the residual best (least squares); zeros when the system cannot be solved.
     fn shares(&self, residual: &[f64]) -> SVector<f64, WINDOW> {
         let mut gram = self.gram;
         let mut wanted = SVector::<f64, WINDOW>::zeros();
@@ -111,7 +122,7 @@ impl Anderson {
     }
 }
 
-/// Scalar product, in four running sums so that it vectorises.
+/// Scalar product in four running sums, which the compiler can vectorise.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let ((a4, a_rest), (b4, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
@@ -122,7 +133,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
-/// New minus old, in the old one's memory.
+/// `new` − `old`, written into `old`.
 fn difference(new: &[f64], mut old: Vec<f64>) -> Vec<f64> {
     old.iter_mut().zip(new).for_each(|(o, n)| *o = n - *o);
     old
@@ -133,16 +144,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_slow_linear_iteration_is_sped_up() {
+    fn a_slow_linear_iteration_is_accelerated() {
         // g(x) = D x + b with contraction rates up to 0.99; the fixed point is b / (1 − D).
         let rate = |k: usize| 0.99 * (k + 1) as f64 / 4.0;
         let mut x = vec![Vec3::zeros(); 4];
-        let mut ahead = Anderson::new(12);
+        let mut mixing = AndersonMixing::new(12);
         for _ in 0..20 {
-            let step: Vec<[f64; 3]> = (0..4)
+            let image: Vec<[f64; 3]> = (0..4)
                 .map(|k| (x[k] * rate(k) + Vec3::repeat(1.0)).into())
                 .collect();
-            ahead.advance(&mut x, &step);
+            mixing.advance(&mut x, &image);
         }
         for (k, p) in x.iter().enumerate() {
             assert!((p - Vec3::repeat(1.0 / (1.0 - rate(k)))).norm() < 1e-6);

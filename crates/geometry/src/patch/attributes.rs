@@ -1,14 +1,15 @@
-//! Texture coordinates and colours of the patch: on the rim the scan's own, inside their smooth continuation.
+//! Texture coordinates and colours of the patch: those of the scan on the rim, their smooth continuation inside.
 //!
-//! A texture seam that runs into the hole runs on through the patch: each island of the texture around the rim is continued on its own
-//! (affine fit over the chart plus the harmonic extension of what is left at the rim), and the patch's faces are shared out among them.
-//! A seam is where columns differ, not where vertices do: scans whose faces share no vertices are dressed like those whose faces do.
+//! A texture seam that meets the rim continues through the patch. Every texture island at the rim is extended alone (an
+//! affine fit over the chart plus the harmonic extension of its residual at the rim), and every face of the patch takes
+//! the values of one island. Two faces belong to one island when their columns agree at common points, even when they
+//! share no vertices.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, Matrix3};
 
-use super::harmonic::Extension;
+use super::harmonic::HarmonicExtension;
 use super::{Patch, PatchPlan};
 use crate::flatten::Chart;
 use crate::mesh::Vec2;
@@ -16,50 +17,49 @@ use crate::mesh::region::Region;
 
 /// The scan's attributes around a hole, as columns of numbers.
 pub struct Columns<'a> {
-    /// Per region face: the scan vertices at its corners; `None` for faces whose attributes mean something else (another material).
+    /// Per region face: the scan vertices at its corners; `None` for faces with other attributes (another material).
     pub corners: &'a [Option<[u32; 3]>],
-    /// Per region vertex: one scan vertex at its place, whatever its attributes.
+    /// Per region vertex: one scan vertex at the same point, with any attributes.
     pub any: &'a [u32],
-    /// The columns of one scan vertex; always `width` long.
+    /// The columns of one scan vertex: `width` numbers.
     pub values: &'a (dyn Fn(u32) -> Vec<f64> + Sync),
     /// Number of columns.
     pub width: usize,
 }
 
-/// A vertex of the patch as it is written: patch vertices on a texture seam occur once per side.
+/// A vertex of the patch with its attributes; a patch vertex on a texture seam has one on each side.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Corner {
     /// The patch vertex.
     pub vertex: u32,
-    /// The scan vertex it coincides with, on the rim.
+    /// On the rim: the scan vertex at the same point.
     pub scan: Option<u32>,
-    /// Its columns.
+    /// Its columns, `width` numbers.
     pub values: Vec<f64>,
 }
 
-/// The patch with its seams cut open.
+/// The patch with attributes, cut along texture seams.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Dressed {
+pub struct AttributedPatch {
     /// Vertices.
     pub corners: Vec<Corner>,
-    /// Faces, in the patch's order.
+    /// Faces as indices into `corners`, in the patch's order.
     pub faces: Vec<[u32; 3]>,
 }
 
-/// Carries the columns over into the patch.
-///
-/// `plan` is the one that the patch was made by.
-pub fn dress(
-    (plan, patch): (&PatchPlan, &Patch),
+/// Extends the scan's attributes into a patch; `plan` must be the plan that made it.
+pub fn extend_attributes(
+    plan: &PatchPlan,
+    patch: &Patch,
     region: &Region,
     chart: &Chart,
     columns: &Columns,
-) -> Dressed {
+) -> AttributedPatch {
     let corners = shared_corners(region, columns);
     let islands = islands(&corners, columns.width);
-    let around = Around {
+    let around = RimAttributes {
         columns,
-        seam: plan.seam(),
+        rim_extension: plan.rim_extension(),
         rim: rim_edges(patch, region, columns, &islands),
         corners,
         islands,
@@ -69,24 +69,24 @@ pub fn dress(
         .iter()
         .flatten()
         .map(|e| e.island)
-        .collect::<std::collections::BTreeSet<_>>()
+        .collect::<BTreeSet<_>>()
         .into_iter()
         .collect();
     let faces = face_labels(patch, &around, &labels);
-    let sheets: BTreeMap<u32, Vec<Vec<f64>>> = labels
+    let extended: BTreeMap<u32, Vec<Vec<f64>>> = labels
         .iter()
-        .map(|l| (*l, continued(*l, patch, region, chart, &around)))
+        .map(|l| (*l, extend_island(*l, patch, region, chart, &around)))
         .collect();
 
     let mut index = BTreeMap::new();
     let mut corners: Vec<Corner> = Vec::new();
-    let mut place = |vertex: u32, label: Option<u32>| {
+    let mut corner = |vertex: u32, label: Option<u32>| {
         *index.entry((vertex, label)).or_insert_with(|| {
             let own = label.and_then(|l| scan_vertex(rim, vertex, l));
             let at_rim = patch.rim.get(vertex as usize);
             let values = match (own, label) {
                 (Some(scan), _) => (columns.values)(scan),
-                (None, Some(l)) => sheets[&l][vertex as usize].clone(),
+                (None, Some(l)) => extended[&l][vertex as usize].clone(),
                 (None, None) => vec![0.0; columns.width],
             };
             corners.push(Corner {
@@ -101,25 +101,26 @@ pub fn dress(
         .faces
         .iter()
         .zip(&faces)
-        .map(|(f, label)| f.map(|v| place(v, *label)))
+        .map(|(f, label)| f.map(|v| corner(v, *label)))
         .collect();
-    Dressed { corners, faces }
+    AttributedPatch { corners, faces }
 }
 
-/// The attributes around a hole, sorted out.
-struct Around<'a> {
+/// The attributes around a hole with their texture islands.
+struct RimAttributes<'a> {
     columns: &'a Columns<'a>,
-    /// The extension from all of the rim.
-    seam: &'a Extension,
-    /// The scan's side of every rim edge, in the patch's order.
+    /// The harmonic extension from the whole rim.
+    rim_extension: &'a HarmonicExtension,
+    /// The scan's side of every rim edge, in the order of the patch's rim; `None` where the face there has other
+    /// attributes.
     rim: Vec<Option<RimEdge>>,
     /// Per region face: its [`shared_corners`].
     corners: Vec<Option<[u32; 3]>>,
-    /// Per region face: its island.
+    /// Per region face: its island, `None` for faces with other attributes.
     islands: Vec<Option<u32>>,
 }
 
-/// The scan's side of a rim edge, from rim vertex k to k + 1.
+/// The scan's side of the rim edge from rim vertex k to k + 1: the island and the scan vertices at both ends.
 #[derive(Debug, Clone, Copy)]
 struct RimEdge {
     island: u32,
@@ -127,7 +128,7 @@ struct RimEdge {
     to: u32,
 }
 
-/// The scan vertex at a rim vertex on the side of an island.
+/// The scan vertex that an island has at a rim vertex.
 fn scan_vertex(rim: &[Option<RimEdge>], vertex: u32, island: u32) -> Option<u32> {
     let k = vertex as usize;
     if k >= rim.len() {
@@ -139,7 +140,7 @@ fn scan_vertex(rim: &[Option<RimEdge>], vertex: u32, island: u32) -> Option<u32>
         .or_else(|| of(rim[(k + rim.len() - 1) % rim.len()]).map(|e| e.to))
 }
 
-/// Per region face: its corners, with one scan vertex for all that share a place and columns and differ in nothing but their number.
+/// Per region face: its corners, where scan vertices at one region vertex with equal columns become one of them.
 ///
 /// O(n log n) in the corners.
 fn shared_corners(region: &Region, columns: &Columns) -> Vec<Option<[u32; 3]>> {
@@ -152,7 +153,7 @@ fn shared_corners(region: &Region, columns: &Columns) -> Vec<Option<[u32; 3]>> {
     uses.dedup();
     let firsts: Vec<u32> = uses
         .chunk_by(|a, b| a.0 == b.0)
-        .flat_map(|at_one_place| first_alike(at_one_place, columns))
+        .flat_map(|at_one_vertex| first_alike(at_one_vertex, columns))
         .collect();
     let first = |used: (u32, u32)| firsts[uses.partition_point(|other| *other < used)];
     faces()
@@ -162,9 +163,9 @@ fn shared_corners(region: &Region, columns: &Columns) -> Vec<Option<[u32; 3]>> {
         .collect()
 }
 
-/// For each of the scan vertices at one region vertex: the first of them with the same columns.
+/// For each of the scan vertices at one region vertex: the first of them with equal columns.
 fn first_alike(uses: &[(u32, u32)], columns: &Columns) -> Vec<u32> {
-    // Nearly all vertices of an indexed scan are alone, and reading columns takes a while.
+    // Most vertices of an indexed scan are alone; this spares reading their columns.
     if let [(_, alone)] = uses {
         return vec![*alone];
     }
@@ -172,16 +173,17 @@ fn first_alike(uses: &[(u32, u32)], columns: &Columns) -> Vec<u32> {
     uses.iter()
         .map(|(_, scan)| {
             let values = (columns.values)(*scan).into_iter();
-            // Adding 0 turns −0, which equals it, into the same bits.
+            // The sum with 0 gives −0 and 0 the same bits.
             let bits: Vec<u64> = values.map(|x| (x + 0.0).to_bits()).collect();
             *seen.entry(bits).or_insert(*scan)
         })
         .collect()
 }
 
-/// The island of every region face, named by its lowest vertex: faces joined where they share vertices; none without attributes.
+/// The island of every region face, which is the lowest scan vertex of all faces connected by shared vertices; `None`
+/// for faces with other attributes.
 fn islands(corners: &[Option<[u32; 3]>], width: usize) -> Vec<Option<u32>> {
-    // Where nothing is carried on, nothing is to be kept apart.
+    // Without columns there are no seams.
     if width == 0 {
         return corners.iter().map(|c| c.map(|_| 0)).collect();
     }
@@ -189,7 +191,7 @@ fn islands(corners: &[Option<[u32; 3]>], width: usize) -> Vec<Option<u32>> {
     let mut vertices: Vec<u32> = all().flatten().copied().collect();
     vertices.sort_unstable();
     vertices.dedup();
-    let place = |v: &u32| vertices.partition_point(|other| other < v);
+    let index = |v: &u32| vertices.partition_point(|other| other < v);
     let mut parent: Vec<usize> = (0..vertices.len()).collect();
     let root = |parent: &[usize], mut k: usize| {
         while parent[k] != k {
@@ -198,19 +200,20 @@ fn islands(corners: &[Option<[u32; 3]>], width: usize) -> Vec<Option<u32>> {
         k
     };
     for corners in all() {
-        let places = corners.each_ref().map(place);
-        let roots = places.map(|k| root(&parent, k));
+        let own = corners.each_ref().map(index);
+        let roots = own.map(|k| root(&parent, k));
         let lowest = roots[0].min(roots[1]).min(roots[2]);
-        // Pointing the corners themselves at the root as well keeps the paths short.
-        (roots.iter().chain(&places)).for_each(|k| parent[*k] = lowest);
+        // The corners point at the root too, which keeps paths short.
+        (roots.iter().chain(&own)).for_each(|k| parent[*k] = lowest);
     }
     corners
         .iter()
-        .map(|corners| corners.map(|[v, ..]| vertices[root(&parent, place(&v))]))
+        .map(|corners| corners.map(|[v, ..]| vertices[root(&parent, index(&v))]))
         .collect()
 }
 
-/// The scan's side of every rim edge, in the patch's order; `None` where the face there has no attributes to carry.
+/// The scan's side of every rim edge, in the order of the patch's rim; `None` where the face there has other
+/// attributes.
 fn rim_edges(
     patch: &Patch,
     region: &Region,
@@ -218,7 +221,7 @@ fn rim_edges(
     islands: &[Option<u32>],
 ) -> Vec<Option<RimEdge>> {
     let count = patch.rim.len();
-    // The face beside the rim runs along it the other way round.
+    // The scan's face at a rim edge has the edge in the opposite direction.
     let wanted: BTreeMap<(u32, u32), usize> = (0..count)
         .map(|k| ((patch.rim[(k + 1) % count], patch.rim[k]), k))
         .collect();
@@ -238,13 +241,14 @@ fn rim_edges(
     edges
 }
 
-/// Which island every patch face belongs to: the one whose part of the rim is harmonically nearest.
-fn face_labels(patch: &Patch, around: &Around, labels: &[u32]) -> Vec<Option<u32>> {
+/// The island of every patch face: at a rim edge that of the scan's face there, elsewhere the one with the largest
+/// harmonic measure (the extension of 1 on its part of the rim and 0 on the rest).
+fn face_labels(patch: &Patch, around: &RimAttributes, labels: &[u32]) -> Vec<Option<u32>> {
     if labels.len() < 2 {
         return vec![labels.first().copied(); patch.faces.len()];
     }
     let rim = &around.rim;
-    let nearness: Vec<Vec<f64>> = labels
+    let measures: Vec<Vec<f64>> = labels
         .iter()
         .map(|label| {
             let on = |k: usize| {
@@ -255,20 +259,20 @@ fn face_labels(patch: &Patch, around: &Around, labels: &[u32]) -> Vec<Option<u32
             let at_rim: Vec<[f64; 1]> = (0..rim.len())
                 .map(|k| [0.5 * (on(k) + on(k + rim.len() - 1))])
                 .collect();
-            around.seam.extend(&at_rim).map_or_else(
+            around.rim_extension.extend(&at_rim).map_or_else(
                 |_| vec![0.0; patch.flat.len()],
                 |x| x.into_iter().map(|[x]| x).collect(),
             )
         })
         .collect();
-    let beside = |f: &[u32; 3]| {
+    let at_rim_edge = |f: &[u32; 3]| {
         (0..3).find_map(|k| {
             let edge = rim.get(f[k] as usize).copied().flatten()?;
             (f[(k + 1) % 3] as usize == (f[k] as usize + 1) % rim.len()).then_some(edge.island)
         })
     };
-    let nearest = |f: &[u32; 3]| {
-        let sum = |l: usize| f.iter().map(|v| nearness[l][*v as usize]).sum::<f64>();
+    let largest = |f: &[u32; 3]| {
+        let sum = |l: usize| f.iter().map(|v| measures[l][*v as usize]).sum::<f64>();
         (0..labels.len())
             .max_by(|a, b| sum(*a).total_cmp(&sum(*b)).then(b.cmp(a)))
             .map(|l| labels[l])
@@ -276,17 +280,18 @@ fn face_labels(patch: &Patch, around: &Around, labels: &[u32]) -> Vec<Option<u32
     patch
         .faces
         .iter()
-        .map(|f| beside(f).or_else(|| nearest(f)))
+        .map(|f| at_rim_edge(f).or_else(|| largest(f)))
         .collect()
 }
 
-/// One island's columns at every patch vertex: affine over the chart, plus the harmonic extension of the remainder at its rim.
-fn continued(
+/// One island's columns at every patch vertex: an affine map of the chart plus the harmonic extension of the residual
+/// at the rim.
+fn extend_island(
     label: u32,
     patch: &Patch,
     region: &Region,
     chart: &Chart,
-    around: &Around,
+    around: &RimAttributes,
 ) -> Vec<Vec<f64>> {
     let (columns, rim) = (around.columns, &around.rim);
     let mut samples: Vec<(u32, Vec2)> = Vec::new();
@@ -312,9 +317,9 @@ fn continued(
     let mut values: Vec<Vec<f64>> = patch.flat.iter().map(&at).collect();
     let from_part;
     let extension = if vertices.len() == rim.len() {
-        Ok(around.seam)
+        Ok(around.rim_extension)
     } else {
-        from_part = Extension::new(&patch.flat, &patch.faces, &vertices);
+        from_part = HarmonicExtension::new(&patch.flat, &patch.faces, &vertices);
         from_part.as_ref()
     };
     if let Ok(extension) = extension {
@@ -323,15 +328,15 @@ fn continued(
             .map(|(_, scan)| (columns.values)(*scan))
             .collect();
         for c in 0..columns.width {
-            let left: Vec<[f64; 1]> = own
+            let residual: Vec<[f64; 1]> = own
                 .iter()
                 .zip(&vertices)
                 .map(|(own, k)| [own[c] - values[*k as usize][c]])
                 .collect();
-            if let Ok(spread) = extension.extend(&left) {
+            if let Ok(extended) = extension.extend(&residual) {
                 values
                     .iter_mut()
-                    .zip(&spread)
+                    .zip(&extended)
                     .for_each(|(v, [d])| v[c] += d);
             }
         }
@@ -339,7 +344,8 @@ fn continued(
     values
 }
 
-/// Least-squares affine map from the chart to the columns, samples near the hole weighing most; rows: constant, x, y.
+/// Least-squares affine map from the chart to the columns, [3, width]: rows constant, x, y. Samples near the hole have
+/// the largest weights.
 fn affine_fit(samples: &[(u32, Vec2)], columns: &Columns, patch: &Patch) -> DMatrix<f64> {
     let rim = patch.rim.len() as f64;
     let centre = patch.flat.iter().take(patch.rim.len()).sum::<Vec2>() / rim;
@@ -361,14 +367,14 @@ fn affine_fit(samples: &[(u32, Vec2)], columns: &Columns, patch: &Patch) -> DMat
             (0..3).for_each(|r| rhs[(r, c)] += weight * row[r] * value);
         }
     }
-    // A touch of ridge: a single line of samples leaves one slope open, which then is zero.
+    // A small ridge term: samples on one line leave one slope open, which becomes zero.
     normal += Matrix3::from_diagonal(&nalgebra::Vector3::new(0.0, 1e-9, 1e-9))
         * normal.trace().max(f64::MIN_POSITIVE);
     let solution = normal.try_inverse().map_or_else(
         || DMatrix::zeros(3, columns.width),
         |inverse| DMatrix::from_fn(3, columns.width, |r, c| (inverse * rhs.column(c))[r]),
     );
-    // Back from centred, scaled coordinates to the chart's.
+    // From centred, scaled coordinates back to the chart's.
     let scale = size.sqrt().max(f64::MIN_POSITIVE);
     DMatrix::from_fn(3, columns.width, |r, c| match r {
         0 => solution[(0, c)] - (solution[(1, c)] * centre.x + solution[(2, c)] * centre.y) / scale,
@@ -378,17 +384,16 @@ fn affine_fit(samples: &[(u32, Vec2)], columns: &Columns, patch: &Patch) -> DMat
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeSet;
-
     use super::*;
     use crate::flatten::{FlattenLimits, flatten};
+    use crate::mesh::index::FaceId;
     use crate::mesh::loops::{LoopKind, boundary_loops};
-    use crate::mesh::shapes::{exploded, sheet, together};
+    use crate::mesh::shapes::{concat, explode, sheet};
     use crate::mesh::weld::weld;
     use crate::mesh::{TriMesh, Vec3, region};
     use crate::patch::{PatchOptions, plan};
 
-    /// A wavy sheet with a round hole, and its texture: right of the middle mirrored, on vertices of its own.
+    /// A wavy sheet with a round hole, and its texture, which is mirrored right of the middle, on separate vertices.
     fn two_islands() -> (TriMesh, Vec<Vec<f64>>) {
         let [left, right] = [false, true].map(|right| {
             let keep = |u: f64, v: f64| (u > 0.5) == right && (u - 0.5).hypot(v - 0.5) > 0.2;
@@ -396,16 +401,16 @@ mod tests {
         });
         let plain = left.positions.iter().map(|p| vec![0.4 * p.x, p.y]);
         let mirrored = right.positions.iter().map(|p| vec![1.0 - 0.4 * p.x, p.y]);
-        (together(&left, &right), plain.chain(mirrored).collect())
+        (concat(&left, &right), plain.chain(mirrored).collect())
     }
 
-    /// The dressed patch of a soup's hole; `texture` holds the columns of its vertices.
-    fn dressed(soup: &TriMesh, texture: &[Vec<f64>]) -> Dressed {
+    /// The attributed patch of a mesh's hole; `texture` holds the columns of its vertices.
+    fn attributed(soup: &TriMesh, texture: &[Vec<f64>]) -> AttributedPatch {
         let welded = weld(soup);
         let topology = welded.topology();
         let loops = boundary_loops(&welded.mesh, &topology);
-        let hole = loops.iter().position(|l| l.kind == LoopKind::Hole).unwrap();
-        let region = region::grow(&welded.mesh, &topology, &loops, hole, f64::INFINITY).unwrap();
+        let hole = loops.iter().find(|l| l.kind == LoopKind::Hole).unwrap();
+        let region = region::grow(&welded.mesh, &topology, &loops, hole.id, f64::INFINITY).unwrap();
         let chart = flatten(&region, &FlattenLimits::default()).unwrap();
         let (options, filled) = (
             PatchOptions::default(),
@@ -414,7 +419,7 @@ mod tests {
         let plan = plan(&region, &chart, &options).unwrap();
         let patch = plan.patch(&chart, &filled, &[], &options).unwrap();
 
-        let source = |f: &u32| soup.faces[welded.face_of[*f as usize] as usize];
+        let source = |f: &FaceId| soup.faces[welded.soup_face[f.index()] as usize];
         let corners: Vec<Option<[u32; 3]>> = region.faces.iter().map(|f| Some(source(f))).collect();
         let mut any = vec![0; region.mesh.positions.len()];
         for (face, f) in region.mesh.faces.iter().zip(&region.faces) {
@@ -427,17 +432,17 @@ mod tests {
             values: &values,
             width: texture[0].len(),
         };
-        dress((&plan, &patch), &region, &chart, &columns)
+        extend_attributes(&plan, &patch, &region, &chart, &columns)
     }
 
     #[test]
-    fn faces_that_share_no_vertices_are_dressed_like_those_that_do() {
+    fn separate_and_shared_vertices_give_the_same_attributes() {
         let (soup, texture) = two_islands();
         let own: Vec<Vec<f64>> = (soup.faces.iter().flatten())
             .map(|v| texture[*v as usize].clone())
             .collect();
-        let shared = dressed(&soup, &texture);
-        let apart = dressed(&exploded(&soup), &own);
+        let shared = attributed(&soup, &texture);
+        let apart = attributed(&explode(&soup), &own);
         assert_eq!(apart.faces, shared.faces);
         assert_eq!(apart.corners.len(), shared.corners.len());
         for (a, b) in apart.corners.iter().zip(&shared.corners) {
@@ -454,8 +459,8 @@ mod tests {
 
     #[test]
     fn without_columns_there_are_no_seams() {
-        let soup = exploded(&two_islands().0);
-        let bare = dressed(&soup, &vec![Vec::new(); soup.positions.len()]);
+        let soup = explode(&two_islands().0);
+        let bare = attributed(&soup, &vec![Vec::new(); soup.positions.len()]);
         let vertices: BTreeSet<u32> = bare.corners.iter().map(|c| c.vertex).collect();
         assert_eq!(vertices.len(), bare.corners.len());
     }

@@ -1,34 +1,43 @@
-//! Harmonic extension over a triangulated patch: values held at some vertices, as smooth as can be (Dirichlet energy) at all others.
+//! Harmonic extension over a triangulated patch: values are given at some vertices and have the least Dirichlet energy
+//! at all others.
 
 use crate::cholesky::{Factor, NotPositive, Symmetric};
 use crate::flatten::RestTriangle;
 use crate::mesh::Vec2;
 
-/// The factored Laplacian of a patch for one set of held vertices.
-pub(super) struct Extension {
+/// The factored cotangent Laplacian of a patch for one set of held vertices.
+pub(super) struct HarmonicExtension {
     factor: Option<Factor>,
-    /// Per vertex: its unknown, or `Held` with its place among the held ones.
+    /// Per vertex.
     role: Vec<Role>,
-    /// Weights between an unknown and a held vertex: (unknown, held, weight).
-    pulls: Vec<(usize, usize, f64)>,
+    /// Edges between a free and a held vertex: (index among the free, index among the held, weight).
+    couplings: Vec<(usize, usize, f64)>,
+    /// How many vertices are free.
     free: usize,
 }
 
+/// Whether a vertex is free or held, and its index among those.
 #[derive(Clone, Copy)]
 enum Role {
     Free(usize),
     Held(usize),
 }
 
-/// Cotangent weights below this share of 1 are raised to it, so that every extension obeys the maximum principle.
+/// Least weight of an edge. Smaller and negative cotangent weights are raised to it, so that the maximum principle
+/// holds.
 const LEAST_WEIGHT: f64 = 1e-3;
 
-impl Extension {
-    /// Prepares extensions from `held` (at least one vertex, each once) over connected faces.
+impl HarmonicExtension {
+    /// Prepares extensions from the vertices `held` (at least one, each once) over connected faces with vertices at
+    /// `flat`.
     ///
     /// # Errors
     /// `NotPositive` when some vertex has no connection to a held one.
-    pub fn new(flat: &[Vec2], faces: &[[u32; 3]], held: &[u32]) -> Result<Extension, NotPositive> {
+    pub fn new(
+        flat: &[Vec2],
+        faces: &[[u32; 3]],
+        held: &[u32],
+    ) -> Result<HarmonicExtension, NotPositive> {
         let mut role = vec![Role::Free(0); flat.len()];
         held.iter()
             .enumerate()
@@ -41,7 +50,7 @@ impl Extension {
             }
         }
         let mut matrix = Symmetric::zero(free);
-        let mut pulls = Vec::new();
+        let mut couplings = Vec::new();
         for face in faces {
             let rest = RestTriangle::from_corners(face.map(|v| flat[v as usize]));
             for k in 0..3 {
@@ -50,7 +59,7 @@ impl Extension {
                     (Role::Free(a), Role::Free(b)) => matrix.add_spring(a, b, weight),
                     (Role::Free(a), Role::Held(b)) | (Role::Held(b), Role::Free(a)) => {
                         matrix.add(a, a, weight);
-                        pulls.push((a, b, weight));
+                        couplings.push((a, b, weight));
                     }
                     (Role::Held(_), Role::Held(_)) => {}
                 }
@@ -61,15 +70,16 @@ impl Extension {
         } else {
             None
         };
-        Ok(Extension {
+        Ok(HarmonicExtension {
             factor,
             role,
-            pulls,
+            couplings,
             free,
         })
     }
 
-    /// Solves with the Laplacian of the free vertices, in place: the smallest Dirichlet energy under a load.
+    /// Solves with the Laplacian of the free vertices, in place: one row of loads per free vertex becomes its solution,
+    /// zero at held ones.
     ///
     /// # Errors
     /// `NotPositive` when the result is not finite.
@@ -79,19 +89,19 @@ impl Extension {
             .map_or(Ok(()), |factor| factor.solve(load))
     }
 
-    /// Bytes held, about.
+    /// Bytes of memory held, about.
     pub fn bytes(&self) -> usize {
         // The factor of a planar Laplacian has some 20 entries a row, with their row numbers.
-        size_of_val(&self.role[..]) + size_of_val(&self.pulls[..]) + self.free * (20 * 12 + 8)
+        size_of_val(&self.role[..]) + size_of_val(&self.couplings[..]) + self.free * (20 * 12 + 8)
     }
 
-    /// Extends one row of values per held vertex to all vertices.
+    /// Extends K values per held vertex to all vertices.
     ///
     /// # Errors
     /// `NotPositive` when the result is not finite.
     pub fn extend<const K: usize>(&self, held: &[[f64; K]]) -> Result<Vec<[f64; K]>, NotPositive> {
         let mut x = vec![[0.0; K]; self.free];
-        for (a, b, weight) in &self.pulls {
+        for (a, b, weight) in &self.couplings {
             (0..K).for_each(|k| x[*a][k] += weight * held[*b][k]);
         }
         if let Some(factor) = &self.factor {
@@ -130,7 +140,7 @@ mod tests {
             .collect();
         let f = |p: &Vec2| [2.0 * p.x - p.y + 1.0];
         let values: Vec<[f64; 1]> = held.iter().map(|v| f(&flat[*v as usize])).collect();
-        let extended = Extension::new(&flat, &faces, &held)
+        let extended = HarmonicExtension::new(&flat, &faces, &held)
             .unwrap()
             .extend(&values)
             .unwrap();

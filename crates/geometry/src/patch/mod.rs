@@ -1,26 +1,34 @@
-//! From a filled grid to triangles on the hole's own rim: triangulation, seam, strain limiting, attributes, and what came of it in numbers.
-//! Stages: `triangulate` → grid positions → `harmonic` (seam) → `cloth` (strain, with `pull`s) → `contacts` → `quality`; `plan` has them in
-//! order, split into what a hole needs once and what each fill needs; `attributes` carries texture and colour over.
-//! No glTF here (the scan's numbers come in as columns) and no network: a patch is made from whatever grid it is given.
+//! Makes the patch of a hole from a filled grid: triangles that start at the hole's rim and have the lengths of the
+//! chart.
+//!
+//! Stages: `triangulate` → positions from the grid → `harmonic` (closes the seam) → `strain` (limits strain, with
+//! `forces` for pulls) → `collisions` → [`quality`]. `plan` calls them in order, first those that depend on the hole
+//! alone, then those that depend on the grid. [`attributes`] continues texture coordinates and colours into the patch.
+//!
+//! Reads no glTF (the scan's attributes come as columns of numbers) and calls no network; any grid will do.
 
 mod anderson;
 pub mod attributes;
 mod bending;
-mod cloth;
-mod contacts;
-mod crossings;
+mod collisions;
+mod deformation;
+mod energy;
+mod forces;
 mod harmonic;
-mod hem;
+mod intersections;
 mod plan;
 mod pull;
 pub mod quality;
+mod rest;
+mod rim_join;
+mod strain;
 #[cfg(test)]
 mod tests;
 mod triangulate;
 mod untangle;
 
-pub use cloth::Elastics;
-pub use plan::{PatchPlan, bearable, plan, plan_in};
+pub use energy::StrainOptions;
+pub use plan::{PatchPlan, plan, plan_in, stretch_limit};
 pub use pull::{Firmness, Pull};
 pub use triangulate::signed_area;
 
@@ -31,13 +39,13 @@ use crate::mesh::{Vec2, Vec3};
 /// Why a hole could not be patched.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum PatchError {
-    /// The rim, laid flat, crosses or touches itself.
+    /// The rim crosses or touches itself in the plane of the chart.
     #[error("the rim crosses itself when the cloth around it is laid flat")]
     RimCrosses,
-    /// A sparse system of the patch had no factor.
+    /// A sparse system of the patch has no factor or no finite solution.
     #[error("the {stage} system of the patch cannot be solved; its triangles are degenerate")]
     Singular {
-        /// Which stage's system.
+        /// The stage that the system belongs to.
         stage: &'static str,
     },
 }
@@ -45,17 +53,17 @@ pub enum PatchError {
 /// How a patch is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PatchOptions {
-    /// Most inner vertices; beyond it the patch is coarser than the scan.
-    pub most_vertices: usize,
-    /// The energy of strain limiting.
-    pub elastics: Elastics,
+    /// Most inner vertices, about; a larger hole gets longer edges.
+    pub max_vertices: usize,
+    /// How strain is limited.
+    pub strain: StrainOptions,
 }
 
 impl Default for PatchOptions {
     fn default() -> Self {
         PatchOptions {
-            most_vertices: 20_000,
-            elastics: Elastics::default(),
+            max_vertices: 20_000,
+            strain: StrainOptions::default(),
         }
     }
 }
@@ -63,25 +71,26 @@ impl Default for PatchOptions {
 /// Triangles that close a hole.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Patch {
-    /// Region vertices of the rim, counter-clockwise around the patch; they are the patch's first vertices. Where the rim touches itself it
-    /// comes to a place more than once, each time at another vertex, and the patch is several pieces that meet there.
+    /// Region vertices of the rim, counter-clockwise around the patch; they are the patch's first vertices. Where the
+    /// rim touches itself, several of them lie at one point and the patch consists of pieces that meet there.
     pub rim: Vec<u32>,
     /// All vertices in the plane of the chart, scene units.
     pub flat: Vec<Vec2>,
-    /// All vertices in scene space; the rim's are the region's own.
+    /// All vertices in scene space; those of the rim lie at the region's positions.
     pub positions: Vec<Vec3>,
     /// Counter-clockwise triangles, oriented as the scan's.
     pub faces: Vec<[u32; 3]>,
     /// Rounds of strain limiting.
     pub strain_rounds: usize,
-    /// Pairs of triangles that crossed after strain limiting and were pushed apart.
+    /// Pairs of triangles that cut each other after strain limiting and were separated.
     pub collisions: usize,
-    /// Pairs of triangles, at least one of the patch, that cross still.
+    /// Pairs of triangles that still cut each other, at least one of them the patch's.
     pub crossings: usize,
 }
 
 impl Patch {
-    /// The position at a point of the plane: barycentric in the triangle there, or the nearest vertex's beside the patch. O(faces).
+    /// The position, scene space, at a point in the plane of the chart: barycentric in its triangle, or that of the
+    /// nearest vertex where the point lies beside the patch. O(faces).
     pub fn at(&self, p: Vec2) -> Vec3 {
         if let Some((face, weights)) = locate(&self.flat, &self.faces, p) {
             let corners = self.faces[face].iter().zip(weights);
@@ -95,7 +104,8 @@ impl Patch {
     }
 }
 
-/// The first face that holds a point of the plane, and the point's barycentric weights in it. O(faces), with a box test for most.
+/// The first face that contains a point of the plane, with the point's barycentric weights. O(faces), with a box test
+/// for most faces.
 fn locate(flat: &[Vec2], faces: &[[u32; 3]], p: Vec2) -> Option<(usize, [f64; 3])> {
     faces.iter().enumerate().find_map(|(k, face)| {
         let [a, b, c] = face.map(|v| flat[v as usize]);
@@ -113,13 +123,11 @@ fn locate(flat: &[Vec2], faces: &[[u32; 3]], p: Vec2) -> Option<(usize, [f64; 3]
     })
 }
 
-/// Meshes the hole of a region with the positions of a filled grid: [`plan`] and [`PatchPlan::patch`] in one, without pulls.
-///
-/// `filled` holds one scene position per cell. Inner vertices are read off it (bicubic), the difference between grid and scan along the
-/// rim is spread harmonically, then the chart's lengths are restored with the rim held, and what crosses is pushed apart.
+/// Meshes the hole of a region with the positions of a filled grid, one per cell, scene space: [`plan`] and
+/// [`PatchPlan::patch`] in one call, without pulls.
 ///
 /// # Errors
-/// `RimCrosses` when the chart overlaps itself at the hole, `Singular` when triangles degenerate.
+/// `RimCrosses` when the rim overlaps itself in the plane, `Singular` when triangles are degenerate.
 pub fn build(
     region: &Region,
     chart: &Chart,

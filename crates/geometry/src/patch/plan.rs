@@ -1,171 +1,177 @@
-//! A patch in two halves: what the hole alone decides (triangles, factors), and what each fill of it needs.
+//! A patch is made in two steps: the plan depends on the hole alone (triangles, factors), the patch also on the filled
+//! grid and the pulls.
 
-use super::cloth::Fabric;
-use super::contacts::Surroundings;
-use super::harmonic::Extension;
-use super::hem::Hem;
+mod anchors;
+mod pieces;
+
+pub use anchors::stretch_limit;
+
+use pieces::{RimPoints, triangulate_pieces};
+
+use super::collisions::CollisionMesh;
+use super::energy::StrainEnergy;
+use super::harmonic::HarmonicExtension;
 use super::pull::Pull;
+use super::rim_join::RimJoin;
+use super::strain::minimise;
 use super::triangulate::Triangulation;
 use super::{Patch, PatchError, PatchOptions};
-
-mod tile;
-mod touch;
 use crate::flatten::Chart;
 use crate::grid;
 use crate::mesh::region::Region;
 use crate::mesh::{TriMesh, Vec2, Vec3};
-use tile::Places;
-pub use touch::bearable;
 
-/// Everything about a patch that does not depend on what fills the hole; owned, so that a session can keep it.
+/// The part of a patch that does not depend on how its hole is filled; it borrows nothing, so a session can keep it.
 pub struct PatchPlan {
+    /// Region vertices of the rim, counter-clockwise around the patch.
     rim: Vec<u32>,
-    /// Positions of the rim.
-    own: Vec<Vec3>,
-    /// What is added to all vertices in the end, where the cloth is to join a rim that lies elsewhere.
+    /// Positions of the rim that the patch is made for, scene space.
+    rim_positions: Vec<Vec3>,
+    /// Per vertex: what is added in the end, when the patch has to meet the rim elsewhere; scene units.
     shift: Option<Vec<Vec3>>,
-    tiled: Triangulation,
-    seam: Extension,
-    hem: Hem,
-    fabric: Fabric,
-    surroundings: Surroundings,
+    triangulation: Triangulation,
+    /// From the rim to all vertices.
+    rim_extension: HarmonicExtension,
+    join: RimJoin,
+    energy: StrainEnergy,
+    collisions: CollisionMesh,
 }
 
-/// Plans the patch of a region's hole, knowing of the scan no more than the region.
+/// Plans the patch of a region's hole when the region is all that is known of the scan.
 ///
 /// # Errors
-/// `RimCrosses` when the chart overlaps itself at the hole, `Singular` when triangles degenerate.
+/// `RimCrosses` when the rim overlaps itself in the plane, `Singular` when triangles are degenerate.
 pub fn plan(
     region: &Region,
     chart: &Chart,
     options: &PatchOptions,
 ) -> Result<PatchPlan, PatchError> {
-    let rim = turned(region);
-    let places = Places::of(&at(&rim, &region.mesh), &region.mesh);
-    planned(rim, places, (region, chart), options)
+    let rim = reversed_rim(region);
+    let rim_points = RimPoints::new(&positions_of(&rim, &region.mesh), &region.mesh);
+    plan_rim(rim, rim_points, region, chart, options)
 }
 
-/// Plans the patch of a region's hole in the whole scan: the region's positions may be others than the scan's (without its noise), and
-/// cloth beyond it may touch the rim.
+/// Plans the patch of a region's hole in the whole scan. The region's positions may differ from the scan's (when it was
+/// denoised), and parts of the scan beyond the region may touch the rim.
 ///
 /// # Errors
-/// `RimCrosses` when the chart overlaps itself at the hole, `Singular` when triangles degenerate.
+/// `RimCrosses` when the rim overlaps itself in the plane, `Singular` when triangles are degenerate.
 pub fn plan_in(
     scan: &TriMesh,
     region: &Region,
     chart: &Chart,
     options: &PatchOptions,
 ) -> Result<PatchPlan, PatchError> {
-    let rim = turned(region);
-    let scanned: Vec<u32> = (rim.iter()).map(|v| region.vertices[*v as usize]).collect();
-    let places = Places::of(&at(&scanned, scan), scan);
-    planned(rim, places, (region, chart), options)
+    let rim = reversed_rim(region);
+    let scanned: Vec<u32> = (rim.iter())
+        .map(|v| region.vertices[*v as usize].0)
+        .collect();
+    let rim_points = RimPoints::new(&positions_of(&scanned, scan), scan);
+    plan_rim(rim, rim_points, region, chart, options)
 }
 
-/// The rim runs with the cloth on its left, so with the hole on its right: turned round it encloses the patch.
-fn turned(region: &Region) -> Vec<u32> {
+/// The rim of a region has the scan on its left and the hole on its right; reversed it runs counter-clockwise around
+/// the patch.
+fn reversed_rim(region: &Region) -> Vec<u32> {
     region.rim.iter().rev().copied().collect()
 }
 
-fn at(vertices: &[u32], mesh: &TriMesh) -> Vec<Vec3> {
+fn positions_of(vertices: &[u32], mesh: &TriMesh) -> Vec<Vec3> {
     let position = |v: &u32| mesh.positions[*v as usize];
     vertices.iter().map(position).collect()
 }
 
-fn planned(
+fn plan_rim(
     rim: Vec<u32>,
-    places: Places,
-    (region, chart): (&Region, &Chart),
+    rim_points: RimPoints,
+    region: &Region,
+    chart: &Chart,
     options: &PatchOptions,
 ) -> Result<PatchPlan, PatchError> {
     let flat: Vec<Vec2> = rim.iter().map(|v| chart.flat[*v as usize]).collect();
-    let tiled = tile::tile(flat, places, spacing(region, chart), options.most_vertices)?;
+    let spacing = spacing(region, chart);
+    let triangulation = triangulate_pieces(flat, rim_points, spacing, options.max_vertices)?;
 
-    let own = at(&rim, &region.mesh);
+    let rim_positions = positions_of(&rim, &region.mesh);
     let held: Vec<u32> = (0..rim.len() as u32).collect();
-    let seam = Extension::new(&tiled.points, &tiled.faces, &held).map_err(|_| singular("seam"))?;
-    let hem = Hem::around(&rim, &tiled, region, chart);
-    let fabric = Fabric::new(&hem.sheet(), &options.elastics).map_err(|_| singular("strain"))?;
-    let surroundings = Surroundings::new(&rim, &tiled, region);
+    let rim_extension = HarmonicExtension::new(&triangulation.points, &triangulation.faces, &held)
+        .map_err(|_| singular("seam"))?;
+    let join = RimJoin::new(&rim, &triangulation, region, chart);
+    let energy =
+        StrainEnergy::new(&join.rest(), &options.strain).map_err(|_| singular("strain"))?;
+    let collisions = CollisionMesh::new(&rim, &triangulation, region);
     Ok(PatchPlan {
         rim,
-        own,
+        rim_positions,
         shift: None,
-        tiled,
-        seam,
-        hem,
-        fabric,
-        surroundings,
+        triangulation,
+        rim_extension,
+        join,
+        energy,
+        collisions,
     })
 }
 
 impl PatchPlan {
-    /// Joins the scan where its vertices really lie, when the region was one without the scanner's noise: the cloth is made without it,
-    /// and what the rim is off by is spread harmonically.
+    /// The same plan for a patch that meets the rim at other `positions` of the region's vertices, scene space. For a
+    /// denoised region: the patch is made without the noise, then the rim's offsets are added, with their harmonic
+    /// extension inside.
     ///
     /// # Errors
-    /// `Singular` when triangles degenerate.
-    pub fn joining(mut self, positions: &[Vec3]) -> Result<PatchPlan, PatchError> {
-        let gaps: Vec<[f64; 3]> = (self.rim.iter().zip(&self.own))
+    /// `Singular` when triangles are degenerate.
+    pub fn with_region_at(mut self, positions: &[Vec3]) -> Result<PatchPlan, PatchError> {
+        let gaps: Vec<[f64; 3]> = (self.rim.iter().zip(&self.rim_positions))
             .map(|(v, own)| (positions[*v as usize] - own).into())
             .collect();
-        let spread = self.seam.extend(&gaps).map_err(|_| singular("seam"))?;
-        self.shift = Some(spread.into_iter().map(Vec3::from).collect());
-        self.surroundings = self.surroundings.around(positions);
+        let extended = (self.rim_extension.extend(&gaps)).map_err(|_| singular("seam"))?;
+        self.shift = Some(extended.into_iter().map(Vec3::from).collect());
+        self.collisions = self.collisions.with_region_at(positions);
         Ok(self)
     }
 
-    /// Keeps the cloth from cutting other layers of the scan, too, not only its region.
-    pub fn among(mut self, others: &TriMesh) -> PatchPlan {
-        self.surroundings = self.surroundings.among(others);
+    /// The same plan for a patch that must not cut these layers of the scan either.
+    pub fn with_layers(mut self, layers: &TriMesh) -> PatchPlan {
+        self.collisions = self.collisions.with_layers(layers);
         self
     }
 
-    /// Pushes a finished patch off cloth that the plan does not know; what it knows stays kept off, too.
-    pub fn keep_off(&self, patch: &mut Patch, others: &TriMesh) {
-        self.surroundings.clone().among(others).separate(patch);
+    /// Separates a finished patch from a mesh that the plan does not contain; the patch stays clear of what the plan
+    /// contains.
+    pub fn separate(&self, patch: &mut Patch, others: &TriMesh) {
+        self.collisions.clone().with_layers(others).separate(patch);
     }
 
-    /// All vertices in the plane of the chart, scene units; the rim's come first.
-    pub fn flat(&self) -> &[Vec2] {
-        &self.tiled.points
+    /// The harmonic extension from the rim to all vertices.
+    pub(super) fn rim_extension(&self) -> &HarmonicExtension {
+        &self.rim_extension
     }
 
-    /// Counter-clockwise triangles, oriented as the scan's.
-    pub fn faces(&self) -> &[[u32; 3]] {
-        &self.tiled.faces
+    /// How many vertices are not on the rim.
+    fn free(&self) -> usize {
+        self.triangulation.points.len() - self.rim.len()
     }
 
-    /// Region vertices of the rim, counter-clockwise around the patch.
-    pub fn rim(&self) -> &[u32] {
-        &self.rim
-    }
-
-    /// The harmonic extension from the rim.
-    pub(super) fn seam(&self) -> &Extension {
-        &self.seam
-    }
-
-    /// Bytes held, about: for a cap on what sessions keep.
+    /// Bytes of memory held, about.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.rim[..])
-            + size_of_val(&self.own[..])
+            + size_of_val(&self.rim_positions[..])
             + self.shift.as_ref().map_or(0, |s| size_of_val(&s[..]))
-            + size_of_val(&self.tiled.points[..])
-            + size_of_val(&self.tiled.faces[..])
-            + self.seam.bytes()
-            + self.hem.bytes()
-            + self.fabric.bytes()
-            + self.surroundings.bytes()
+            + size_of_val(&self.triangulation.points[..])
+            + size_of_val(&self.triangulation.faces[..])
+            + self.rim_extension.bytes()
+            + self.join.bytes()
+            + self.energy.bytes()
+            + self.collisions.bytes()
     }
 
-    /// Meshes the hole with the positions of a filled grid and draws it to where the pulls want it.
+    /// Meshes the hole with the positions of a filled grid (one per cell, scene space) and moves it towards the targets
+    /// of the pulls.
     ///
-    /// `chart` must be the one of [`plan`]. `options` may differ from the plan's in what does not set the triangles; other weights of
-    /// bending and tether cost a new factor. A pull beside the hole, or all but on its rim, does nothing.
+    /// `chart` must be the plan's. Of the options only those of strain limiting are read; other lengths of bending and
+    /// tether than the plan's cost a new factor. A pull beside the hole, or next to its rim, does nothing.
     ///
     /// # Errors
-    /// `Singular` when triangles degenerate.
+    /// `Singular` when triangles are degenerate.
     pub fn patch(
         &self,
         chart: &Chart,
@@ -173,66 +179,72 @@ impl PatchPlan {
         pulls: &[Pull],
         options: &PatchOptions,
     ) -> Result<Patch, PatchError> {
-        let elastics = &options.elastics;
-        let other;
-        let fabric = if self.fabric.fits(elastics) {
-            &self.fabric
+        let strain = &options.strain;
+        let refactored;
+        let energy = if self.energy.fits(strain) {
+            &self.energy
         } else {
-            other = Fabric::new(&self.hem.sheet(), elastics).map_err(|_| singular("strain"))?;
-            &other
+            refactored =
+                StrainEnergy::new(&self.join.rest(), strain).map_err(|_| singular("strain"))?;
+            &refactored
         };
-        let mut positions = self.hem.with_inner(self.drawing(chart, filled)?);
-        let rest = fabric.relax(&mut positions, elastics);
+        let mut positions = self.join.with_inner(self.initial(chart, filled)?);
+        let target = energy.target_near(&positions, strain);
+        let rounds = minimise(energy, &target, &mut positions, None, strain);
         let mut patch = Patch {
             rim: self.rim.clone(),
-            flat: self.tiled.points.clone(),
+            flat: self.triangulation.points.clone(),
             positions: self.with_rim(&positions),
-            faces: self.tiled.faces.clone(),
-            strain_rounds: rest.map_err(|_| singular("strain"))?.rounds,
+            faces: self.triangulation.faces.clone(),
+            strain_rounds: rounds.map_err(|_| singular("strain"))?,
             collisions: 0,
             crossings: 0,
         };
-        self.shift(&mut patch, 1.0);
-        self.surroundings.separate(&mut patch);
-        let grips = self.grips(pulls, chart);
-        if !grips.is_empty() {
-            self.shift(&mut patch, -1.0);
-            let inner = patch.positions[self.own.len()..].to_vec();
-            let mut positions = self.hem.with_inner(inner);
-            let rounds = self.pull(fabric, &mut positions, &grips, elastics);
+        self.shift(&mut patch.positions, 1.0);
+        self.collisions.separate(&mut patch);
+        if pulls.is_empty() {
+            return Ok(patch);
+        }
+        let mut unshifted = patch.positions.clone();
+        self.shift(&mut unshifted, -1.0);
+        let mut positions = self.join.with_inner(unshifted.split_off(self.rim.len()));
+        let forces = self.forces(pulls, chart, &positions);
+        if !forces.is_empty() {
+            let rounds = self.apply_forces(energy, &mut positions, &forces, strain);
             patch.strain_rounds += rounds.map_err(|_| singular("strain"))?;
             patch.positions = self.with_rim(&positions);
-            self.shift(&mut patch, 1.0);
-            self.surroundings.separate(&mut patch);
+            self.shift(&mut patch.positions, 1.0);
+            self.collisions.separate(&mut patch);
         }
         Ok(patch)
     }
 
-    /// Moves a patch to where the rim really lies, or back from there.
-    fn shift(&self, patch: &mut Patch, share: f64) {
+    /// Adds `share` of the shift to the positions of a patch.
+    fn shift(&self, positions: &mut [Vec3], share: f64) {
         let by = self.shift.as_deref().unwrap_or_default();
-        let each = patch.positions.iter_mut().zip(by);
+        let each = positions.iter_mut().zip(by);
         each.for_each(|(p, by)| *p += by * share);
     }
 
-    /// The rim's own positions, then the inner ones of a hem.
+    /// Positions of the patch: the rim's, then the inner ones of a [`RimJoin`].
     fn with_rim(&self, positions: &[Vec3]) -> Vec<Vec3> {
-        let free = self.tiled.points.len() - self.own.len();
-        let rim = self.own.iter().copied();
-        rim.chain(positions[..free].iter().copied()).collect()
+        let rim = self.rim_positions.iter().copied();
+        rim.chain(positions[..self.free()].iter().copied())
+            .collect()
     }
 
-    /// The inner points read off the filled grid, shifted so that the seam is closed: the differences at the rim are spread harmonically.
-    fn drawing(&self, chart: &Chart, filled: &[Vec3]) -> Result<Vec<Vec3>, PatchError> {
-        let drawn: Vec<Vec3> = (self.tiled.points.iter())
+    /// Positions of the inner vertices, read off the filled grid (bicubic). The differences between grid and scan at
+    /// the rim are added, with their harmonic extension inside, so that the seam is closed.
+    fn initial(&self, chart: &Chart, filled: &[Vec3]) -> Result<Vec<Vec3>, PatchError> {
+        let sampled: Vec<Vec3> = (self.triangulation.points.iter())
             .map(|p| grid::evaluate(filled, chart.frame.uv(*p)))
             .collect();
-        let gaps: Vec<[f64; 3]> = (self.own.iter().zip(&drawn))
-            .map(|(own, drawn)| (own - drawn).into())
+        let gaps: Vec<[f64; 3]> = (self.rim_positions.iter().zip(&sampled))
+            .map(|(own, sampled)| (own - sampled).into())
             .collect();
-        let spread = self.seam.extend(&gaps).map_err(|_| singular("seam"))?;
-        let closed = drawn.iter().zip(&spread).map(|(p, d)| p + Vec3::from(*d));
-        Ok(closed.skip(self.own.len()).collect())
+        let extended = (self.rim_extension.extend(&gaps)).map_err(|_| singular("seam"))?;
+        let closed = (sampled.iter().zip(&extended)).map(|(p, d)| p + Vec3::from(*d));
+        Ok(closed.skip(self.rim.len()).collect())
     }
 }
 
@@ -240,21 +252,21 @@ fn singular(stage: &'static str) -> PatchError {
     PatchError::Singular { stage }
 }
 
-/// Edge length of a patch, in the plane: as fine as the grid that is drawn from, so that no fold drawn there is cut short, but between half
-/// the scan's own resolution and all of it.
+/// Edge length of a patch in the plane, scene units: a grid cell's side, so that the patch follows all folds of the
+/// grid, but at most the scan's median edge and at least `FINER` of it.
 fn spacing(region: &Region, chart: &Chart) -> f64 {
     let (edge, cell) = (
         median_edge(region, chart),
         chart.frame.side / grid::SIDE as f64,
     );
-    // Not `clamp`, which panics where a chart is not finite.
+    // Not `clamp`, which panics when the chart is not finite.
     cell.max(FINER * edge).min(edge)
 }
 
-/// How much finer than the scan a patch may be.
+/// Least edge length of a patch ÷ median edge length of the scan.
 const FINER: f64 = 0.5;
 
-/// Median edge length of the region in the plane: the scan's own resolution.
+/// Median edge length of the region in the plane, scene units; 1 without faces.
 fn median_edge(region: &Region, chart: &Chart) -> f64 {
     let edge = |f: &[u32; 3], k: usize| {
         (chart.flat[f[k] as usize] - chart.flat[f[(k + 1) % 3] as usize]).norm()

@@ -1,4 +1,4 @@
-//! What a patch is worth, in numbers that the report carries.
+//! Measures the quality of a patch for the report.
 
 use super::Patch;
 use crate::mesh::TriMesh;
@@ -9,15 +9,15 @@ use crate::mesh::region::Region;
 pub struct Quality {
     /// Area, scene units squared.
     pub area: f64,
-    /// Mean over edges of their length ÷ their length in the chart.
+    /// Mean of length ÷ length in the chart over the edges with an inner vertex; 1 without such edges.
     pub stretch_mean: f64,
     /// Maximum of the same.
     pub stretch_max: f64,
-    /// Mean |2π − Σ angles| of the inner vertices, radians; 0 where the patch is developable.
+    /// Mean |2π − Σ angles| over the inner vertices, radians; 0 when the patch is developable.
     pub gaussian_curvature: f64,
     /// Largest distance between the patch's rim and the scan's, scene units.
     pub seam_gap: f64,
-    /// Pairs of triangles, at least one of the patch, that cut each other.
+    /// Pairs of triangles that cut each other, at least one of them the patch's.
     pub self_intersections: usize,
 }
 
@@ -34,7 +34,7 @@ pub fn measure(patch: &Patch, region: &Region) -> Quality {
             let (next, last) = ((k + 1) % 3, (k + 2) % 3);
             let (to_next, to_last) = (p[next] - p[k], p[last] - p[k]);
             angles[face[k] as usize] += to_next.cross(&to_last).norm().atan2(to_next.dot(&to_last));
-            // An edge between two rim vertices is the scan's, not the patch's, to stretch.
+            // The scan sets the length of an edge between two rim vertices.
             if face[k].max(face[next]) as usize >= patch.rim.len() {
                 let stretch = to_next.norm() / (flat[next] - flat[k]).norm().max(f64::MIN_POSITIVE);
                 sum += stretch;
@@ -60,18 +60,18 @@ pub fn measure(patch: &Patch, region: &Region) -> Quality {
     }
 }
 
-/// The region's mesh with the patch appended; the patch's faces come last.
+/// The region's mesh with the patch appended: the patch's inner vertices and its faces come last.
 pub fn joined(patch: &Patch, region: &Region) -> TriMesh {
     let mut mesh = region.mesh.clone();
     let (rim, base) = (patch.rim.len(), mesh.positions.len() as u32);
     mesh.positions.extend_from_slice(&patch.positions[rim..]);
-    let place = |v: u32| {
+    let vertex = |v: u32| {
         patch
             .rim
             .get(v as usize)
             .copied()
             .unwrap_or(base + v - rim as u32)
     };
-    mesh.faces.extend(patch.faces.iter().map(|f| f.map(place)));
+    mesh.faces.extend(patch.faces.iter().map(|f| f.map(vertex)));
     mesh
 }

@@ -1,25 +1,25 @@
-//! Laws of patches as a whole.
+//! Properties of whole patches.
 
 use super::*;
 use crate::flatten::{FlattenLimits, UvSquare, flatten};
 use crate::mesh::intersect::intersections_with;
 use crate::mesh::loops::{LoopKind, boundary_loops};
 use crate::mesh::region;
-use crate::mesh::shapes::{shaken, sheet};
+use crate::mesh::shapes::{jitter, sheet};
 use crate::mesh::topology::Topology;
 use crate::mesh::weld::weld;
 
-/// A wavy sheet with a round hole, its chart enlarged by `slack` (1 for none), and a fill that knows nothing.
+/// A wavy sheet with a round hole, its chart scaled by `slack` (1 for none), and a grid of zeros.
 ///
-/// Without slack the cloth in the hole is taut between the rulings' ends and no pull is within reach.
+/// Without slack the patch is taut along its straight lines, and no pull can be met.
 fn wavy(slack: f64) -> (Region, Chart, Vec<Vec3>) {
     let keep = |u: f64, v: f64| (u - 0.5).hypot(v - 0.5) > 0.2;
     let wave = |u: f64, v: f64| Vec3::new(u, v, 0.06 * (10.0 * u).sin());
     let mesh = weld(&sheet(36, keep, wave)).mesh;
     let topology = Topology::new(&mesh);
     let loops = boundary_loops(&mesh, &topology);
-    let hole = loops.iter().position(|l| l.kind == LoopKind::Hole).unwrap();
-    let region = region::grow(&mesh, &topology, &loops, hole, f64::INFINITY).unwrap();
+    let hole = loops.iter().find(|l| l.kind == LoopKind::Hole).unwrap();
+    let region = region::grow(&mesh, &topology, &loops, hole.id, f64::INFINITY).unwrap();
     let mut chart = flatten(&region, &FlattenLimits::default()).unwrap();
     chart.flat.iter_mut().for_each(|p| *p *= slack);
     chart.frame = UvSquare::tightest(&chart.flat);
@@ -42,13 +42,23 @@ fn unpulled(region: &Region, chart: &Chart, filled: &[Vec3]) -> (PatchPlan, Patc
     (plan, patch, middle)
 }
 
-fn pulled(slack: f64, to: Vec3, hold: Firmness) -> (Patch, Patch, Vec3, f64) {
+/// A pull on the middle of the patch.
+struct Pulled {
+    patch: Patch,
+    unpulled: Patch,
+    target: Vec3,
+    /// Distance from the pulled point to its target.
+    off: f64,
+}
+
+/// Pulls the middle of a patch by `by` and checks the rim and the stretch.
+fn pulled(slack: f64, by: Vec3, firmness: Firmness) -> Pulled {
     let (region, chart, filled) = wavy(slack);
     let (plan, free, middle) = unpulled(&region, &chart, &filled);
     let pull = Pull {
         at: free.flat[middle],
-        to: free.positions[middle] + to,
-        hold,
+        to: free.positions[middle] + by,
+        firmness,
     };
     let patch = plan
         .patch(&chart, &filled, &[pull], &PatchOptions::default())
@@ -66,46 +76,51 @@ fn pulled(slack: f64, to: Vec3, hold: Firmness) -> (Patch, Patch, Vec3, f64) {
         stretch <= (1.05 * usual).max(1.25) + 1e-9,
         "{stretch} {usual}"
     );
-    (patch, free, pull.to, off)
+    Pulled {
+        patch,
+        unpulled: free,
+        target: pull.to,
+        off,
+    }
 }
 
 #[test]
-fn planned_or_not_the_patch_is_the_same() {
+fn build_gives_the_same_patch_as_a_plan() {
     let (region, chart, filled) = wavy(1.0);
     let (plan, patch, _) = unpulled(&region, &chart, &filled);
     assert_eq!(
         build(&region, &chart, &filled, &PatchOptions::default()).unwrap(),
         patch
     );
-    assert_eq!(plan.flat(), patch.flat);
-    assert_eq!(plan.faces(), patch.faces);
-    assert_eq!(plan.rim(), patch.rim);
     assert!(plan.bytes() > 0);
 }
 
 #[test]
 fn a_pull_within_reach_is_met() {
-    for hold in [Firmness::Soft, Firmness::Hard] {
-        let (_, _, _, off) = pulled(1.05, Vec3::new(0.0, 0.0, -0.02), hold);
+    for firmness in [Firmness::Soft, Firmness::Hard] {
+        let Pulled { off, .. } = pulled(1.05, Vec3::new(0.0, 0.0, -0.02), firmness);
         // Half a cell of a grid over the whole sheet.
-        assert!(off < 0.5 / 64.0, "{off} {hold:?}");
+        assert!(off < 0.5 / 64.0, "{off} {firmness:?}");
     }
 }
 
 #[test]
-fn an_absurd_pull_tears_nothing() {
-    let (patch, _, to, off) = pulled(1.0, Vec3::new(4.0, 1.0, 3.0), Firmness::Hard);
-    assert!(off > 4.0);
-    assert!(patch.positions.iter().all(|p| (p - to).norm() > 4.0));
+fn no_vertex_follows_a_pull_far_beyond_reach() {
+    let pulled = pulled(1.0, Vec3::new(4.0, 1.0, 3.0), Firmness::Hard);
+    assert!(pulled.off > 4.0);
+    let away = |p: &Vec3| (p - pulled.target).norm();
+    assert!(pulled.patch.positions.iter().all(|p| away(p) > 4.0));
 }
 
 #[test]
-fn a_pull_to_where_the_cloth_is_changes_next_to_nothing() {
-    let (patch, free, _, _) = pulled(1.0, Vec3::zeros(), Firmness::Soft);
+fn a_pull_to_where_its_point_lies_changes_almost_nothing() {
+    let Pulled {
+        patch, unpulled, ..
+    } = pulled(1.0, Vec3::zeros(), Firmness::Soft);
     let squares = patch
         .positions
         .iter()
-        .zip(&free.positions)
+        .zip(&unpulled.positions)
         .map(|(a, b)| (a - b).norm_squared());
     assert!((squares.sum::<f64>() / patch.positions.len() as f64).sqrt() < 0.1 / 64.0);
 }
@@ -115,10 +130,10 @@ fn a_pull_beside_the_hole_or_at_its_rim_does_nothing() {
     let (region, chart, filled) = wavy(1.0);
     let (plan, free, _) = unpulled(&region, &chart, &filled);
     let beside = (chart.frame.point(Vec2::new(0.02, 0.02)), Firmness::Hard);
-    let at_rim = (plan.flat()[0], Firmness::Soft);
-    for (at, hold) in [beside, at_rim] {
+    let at_rim = (free.flat[0], Firmness::Soft);
+    for (at, firmness) in [beside, at_rim] {
         let to = Vec3::zeros();
-        let pull = Pull { at, to, hold };
+        let pull = Pull { at, to, firmness };
         assert_eq!(
             plan.patch(&chart, &filled, &[pull], &PatchOptions::default())
                 .unwrap(),
@@ -127,16 +142,16 @@ fn a_pull_beside_the_hole_or_at_its_rim_does_nothing() {
     }
 }
 
-/// A finger moves the cloth about it, not one triangle: beside a pulled point its neighbours have come most of the way.
+/// A pull moves a disk, not one triangle: the vertices near the pulled point move most of the way, too.
 #[test]
-fn a_pull_draws_no_pimple() {
+fn a_pull_raises_no_spike() {
     let (region, chart, filled) = wavy(1.05);
     let (plan, free, middle) = unpulled(&region, &chart, &filled);
     let to = free.positions[middle] + Vec3::new(0.0, 0.0, 0.02);
     let pull = Pull {
         at: free.flat[middle],
         to,
-        hold: Firmness::Soft,
+        firmness: Firmness::Soft,
     };
     let patch = plan
         .patch(&chart, &filled, &[pull], &PatchOptions::default())
@@ -151,14 +166,15 @@ fn a_pull_draws_no_pimple() {
 }
 
 #[test]
-fn a_patch_meets_the_rim_where_it_really_lies_and_keeps_off_other_cloth_there() {
+fn a_patch_meets_a_moved_rim_and_avoids_a_layer_there() {
     let (region, chart, filled) = wavy(1.0);
     let (plain, free, middle) = unpulled(&region, &chart, &filled);
     let up = Vec3::new(0.0, 0.0, 0.05);
     let mut noisy = region.clone();
-    noisy.mesh = shaken(&region.mesh, 0.002, 1);
+    noisy.mesh = jitter(&region.mesh, 0.002, 1);
     noisy.mesh.positions.iter_mut().for_each(|p| *p += up);
-    // Below where the patch comes to lie but for a bump, and above where it would lie without the shift.
+    // The layer lies below the patch, except for a bump through it, and above where the patch would lie without the
+    // shift.
     let centre = free.positions[middle] + up;
     let bumpy = |u: f64, v: f64| {
         let (x, y) = (0.16 * (u - 0.5), 0.16 * (v - 0.5));
@@ -176,14 +192,14 @@ fn a_patch_meets_the_rim_where_it_really_lies_and_keeps_off_other_cloth_there() 
             .extend(layer.faces.iter().map(|f| f.map(|v| base + v)));
         intersections_with(&all, &own).len()
     };
-    let joining = plain.joining(&noisy.mesh.positions).unwrap();
+    let moved = plain.with_region_at(&noisy.mesh.positions).unwrap();
     let patch = |plan: &PatchPlan| {
         plan.patch(&chart, &filled, &[], &PatchOptions::default())
             .unwrap()
     };
-    let through = patch(&joining);
-    assert!(cuts(&through) > 0, "nothing told it of the layer");
-    let beside = patch(&joining.among(&layer));
+    let through = patch(&moved);
+    assert!(cuts(&through) > 0, "the plan does not contain the layer");
+    let beside = patch(&moved.with_layers(&layer));
     let wanted = (beside.rim.iter()).map(|v| noisy.mesh.positions[*v as usize]);
     for (own, wanted) in beside.positions.iter().zip(wanted) {
         assert!((own - wanted).norm() < 1e-12);
@@ -192,9 +208,10 @@ fn a_patch_meets_the_rim_where_it_really_lies_and_keeps_off_other_cloth_there() 
     assert_eq!((beside.crossings, cuts(&beside)), (0, 0));
 }
 
-/// Two square holes that touch in a corner have one rim. Without the scan's noise it lies in two places there, which on the scan are one.
+/// Two square holes that touch in a corner have one rim. Its two vertices there coincide on the scan, but not in the
+/// denoised region.
 #[test]
-fn a_rim_that_touches_itself_is_closed_where_the_scan_lies() {
+fn a_rim_that_touches_itself_is_closed_on_the_scan() {
     let square = |x: f64| (18.0 * x) as usize;
     let in_hole = |u: f64, v: f64| {
         let holes = [4usize..9, 9..14];
@@ -204,17 +221,17 @@ fn a_rim_that_touches_itself_is_closed_where_the_scan_lies() {
     let scan = weld(&sheet(18, |u, v| !in_hole(u, v), wave)).mesh;
     let topology = Topology::new(&scan);
     let loops = boundary_loops(&scan, &topology);
-    let hole = loops.iter().position(|l| l.kind == LoopKind::Hole).unwrap();
-    let region = region::grow(&scan, &topology, &loops, hole, f64::INFINITY).unwrap();
+    let hole = loops.iter().find(|l| l.kind == LoopKind::Hole).unwrap();
+    let region = region::grow(&scan, &topology, &loops, hole.id, f64::INFINITY).unwrap();
     let mut seen = region.clone();
     let apart = (seen.mesh.positions.iter_mut()).enumerate();
     apart.for_each(|(v, p)| p.z += 1e-3 * (v as f64).sin());
     let chart = flatten(&seen, &FlattenLimits::default()).unwrap();
     let options = PatchOptions::default();
     let plan = plan_in(&scan, &seen, &chart, &options).unwrap();
-    let joining = plan.joining(&region.mesh.positions).unwrap();
+    let plan = plan.with_region_at(&region.mesh.positions).unwrap();
     let filled = vec![Vec3::zeros(); crate::grid::CELLS];
-    let patch = joining.patch(&chart, &filled, &[], &options).unwrap();
+    let patch = plan.patch(&chart, &filled, &[], &options).unwrap();
 
     let whole = weld(&quality::joined(&patch, &region));
     assert_eq!(whole.dropped, 0, "a triangle has no area");

@@ -1,4 +1,5 @@
-//! The hole's polygon in the plane → triangles: an even triangular lattice inside, constrained Delaunay (spade) with the rim's edges.
+//! Triangles for a polygon in the plane: points of a triangular lattice inside, then a constrained Delaunay
+//! triangulation (crate spade) with the polygon's edges.
 
 use rstar::RTree;
 use rstar::primitives::Line;
@@ -7,29 +8,31 @@ use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation
 use super::PatchError;
 use crate::mesh::Vec2;
 
-/// Lattice points nearer to the rim than this, in lattice spacings, are left out: they would make slivers.
+/// Lattice points nearer to the polygon than this, in lattice spacings, are left out: they would make slivers.
 const CLEARANCE: f64 = 0.62;
 
-/// Most lattice spacings across a polygon: a hair's breadth of cloth in a wide ragged rim must not make millions of empty rows.
+/// Most lattice spacings across a polygon: a thin area inside a wide ragged polygon must not make millions of empty
+/// rows.
 const FINEST: f64 = 4000.0;
 
 /// A triangulated polygon.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Triangulation {
-    /// The polygon's corners in their order, then the inner points.
+    /// The polygon's corners in their order, then the inner points; scene units.
     pub points: Vec<Vec2>,
     /// Counter-clockwise triangles; every polygon edge belongs to exactly one.
     pub faces: Vec<[u32; 3]>,
 }
 
-/// Triangulates a simple counter-clockwise polygon with edges of about `spacing` inside, and at most about `most` inner points.
+/// Triangulates a simple counter-clockwise polygon with inner edges of length about `spacing`, or longer so that there
+/// are at most about `max_points` inner points.
 ///
 /// # Errors
 /// `RimCrosses` when the polygon crosses or touches itself.
 pub fn triangulate(
     polygon: &[Vec2],
     spacing: f64,
-    most: usize,
+    max_points: usize,
 ) -> Result<Triangulation, PatchError> {
     let area = signed_area(polygon);
     if area.is_nan() || area <= 0.0 {
@@ -40,7 +43,7 @@ pub fn triangulate(
         .map(|p| (p - polygon[0]).amax())
         .fold(0.0, f64::max);
     let spacing = spacing.max(extent / FINEST);
-    let spacing = spacing.max((area / most.max(1) as f64 / 0.75f64.sqrt()).sqrt());
+    let spacing = spacing.max((area / max_points.max(1) as f64 / 0.75f64.sqrt()).sqrt());
     let mut points = polygon.to_vec();
     points.extend(lattice(polygon, spacing));
     let faces = constrained_delaunay(&points, polygon.len())?;
@@ -48,10 +51,10 @@ pub fn triangulate(
 }
 
 impl Triangulation {
-    /// Splits every inner edge between two polygon corners that `taken` names, in the middle.
+    /// Splits in the middle every inner edge between two of the polygon's `corners` that `taken` names.
     ///
-    /// A rim that comes back to itself can have two corners that are joined by an edge of the scan already; joined by the patch, too,
-    /// that edge would have four triangles.
+    /// Two corners of a rim can be joined by an edge of the scan already. A second edge between them, of the patch,
+    /// would be the same edge with four triangles.
     pub fn split_chords(&mut self, corners: usize, taken: impl Fn(u32, u32) -> bool) {
         let apart = |a: u32, b: u32| {
             (a as usize + 1) % corners != b as usize && (b as usize + 1) % corners != a as usize
@@ -74,7 +77,7 @@ impl Triangulation {
     }
 }
 
-/// The face itself, or its two halves if it has the edge, in either direction.
+/// The two halves of a face that has the edge, in either direction; the face itself where it has not.
 fn halves(face: [u32; 3], edge: (u32, u32), middle: u32) -> Vec<[u32; 3]> {
     let on = (0..3).find(|k| {
         let (a, b) = (face[*k], face[(k + 1) % 3]);
@@ -89,7 +92,7 @@ fn halves(face: [u32; 3], edge: (u32, u32), middle: u32) -> Vec<[u32; 3]> {
     }
 }
 
-/// Signed area of a polygon (shoelace), positive when counter-clockwise.
+/// Signed area of a polygon (shoelace formula), in its units squared; positive when counter-clockwise.
 pub fn signed_area(polygon: &[Vec2]) -> f64 {
     let next = polygon.iter().cycle().skip(1);
     0.5 * polygon
@@ -99,7 +102,7 @@ pub fn signed_area(polygon: &[Vec2]) -> f64 {
         .sum::<f64>()
 }
 
-/// Points of a triangular lattice inside the polygon, clear of its edges.
+/// Points of a triangular lattice inside the polygon, at a distance from its edges.
 fn lattice(polygon: &[Vec2], spacing: f64) -> Vec<Vec2> {
     let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
     let tree = RTree::bulk_load(
@@ -115,7 +118,7 @@ fn lattice(polygon: &[Vec2], spacing: f64) -> Vec<Vec2> {
     for row in 0..=((high.y - low.y) / rise) as usize {
         let y = low.y + (row as f64 + 0.5) * rise;
         let shift = if row % 2 == 0 { 0.25 } else { 0.75 };
-        for span in crossings(polygon, y).chunks_exact(2) {
+        for span in scan_line(polygon, y).chunks_exact(2) {
             let first = ((span[0] - low.x) / spacing - shift).ceil();
             let last = ((span[1] - low.x) / spacing - shift).floor();
             for column in first as i64..=last as i64 {
@@ -133,8 +136,8 @@ fn lattice(polygon: &[Vec2], spacing: f64) -> Vec<Vec2> {
     points
 }
 
-/// Where a horizontal line enters and leaves the polygon, in order of x.
-fn crossings(polygon: &[Vec2], y: f64) -> Vec<f64> {
+/// The x coordinates where a horizontal line enters and leaves the polygon, ascending.
+fn scan_line(polygon: &[Vec2], y: f64) -> Vec<f64> {
     let mut xs: Vec<f64> = polygon
         .iter()
         .zip(polygon.iter().cycle().skip(1))
@@ -145,41 +148,42 @@ fn crossings(polygon: &[Vec2], y: f64) -> Vec<f64> {
     xs
 }
 
-/// A point that remembers its index.
+/// A point with its index.
 #[derive(Clone, Copy)]
-struct Indexed {
+struct IndexedPoint {
     at: Point2<f64>,
     index: u32,
 }
 
-impl HasPosition for Indexed {
+impl HasPosition for IndexedPoint {
     type Scalar = f64;
     fn position(&self) -> Point2<f64> {
         self.at
     }
 }
 
-/// Delaunay triangles inside the polygon made of the first `rim` points.
+/// Delaunay triangles inside the polygon of the first `rim` points.
 fn constrained_delaunay(points: &[Vec2], rim: usize) -> Result<Vec<[u32; 3]>, PatchError> {
     let vertices = (0u32..)
         .zip(points)
-        .map(|(index, p)| Indexed {
+        .map(|(index, p)| IndexedPoint {
             at: Point2::new(p.x, p.y),
             index,
         })
         .collect();
     let edges = (0..rim).map(|k| [k, (k + 1) % rim]).collect();
     let mut crossed = false;
-    let cdt =
-        ConstrainedDelaunayTriangulation::<Indexed>::try_bulk_load_cdt(vertices, edges, |_| {
-            crossed = true
-        })
-        .map_err(|_| PatchError::RimCrosses)?;
+    let cdt = ConstrainedDelaunayTriangulation::<IndexedPoint>::try_bulk_load_cdt(
+        vertices,
+        edges,
+        |_| crossed = true,
+    )
+    .map_err(|_| PatchError::RimCrosses)?;
     if crossed || cdt.num_vertices() != points.len() || cdt.num_constraints() != rim {
         return Err(PatchError::RimCrosses);
     }
 
-    // Flood from the inner side of the rim's edges; constraints stop it.
+    // Flood fill from the inner sides of the polygon's edges, which bound it.
     let mut inside = vec![false; cdt.num_all_faces()];
     let mut open: Vec<_> = cdt
         .directed_edges()
@@ -201,11 +205,12 @@ fn constrained_delaunay(points: &[Vec2], rim: usize) -> Result<Vec<[u32; 3]>, Pa
             .filter(|e| !e.is_constraint_edge());
         open.extend(across.filter_map(|e| e.rev().face().as_inner()));
     }
-    // Triangle count of a polygon with inner points (Euler): anything else leaked or lost a piece.
+    // The triangle count of a polygon with inner points follows from Euler's formula; any other count means that the
+    // fill leaked or missed a piece.
     if faces.len() + 2 != rim + 2 * (points.len() - rim) {
         return Err(PatchError::RimCrosses);
     }
-    // Start every triangle at its lowest corner and sort: the order then depends on the points alone.
+    // Start every triangle at its lowest corner and sort them, so that the order depends on the points alone.
     for face in &mut faces {
         let lowest = (0..3).min_by_key(|k| face[*k]).unwrap_or(0);
         face.rotate_left(lowest);
@@ -230,23 +235,23 @@ mod tests {
 
     proptest! {
         #[test]
-        fn triangles_tile_any_star(radii in prop::collection::vec(0.5..2.0f64, 5..60), spacing in 0.05..0.6f64) {
+        fn triangles_cover_any_star_polygon_once(radii in prop::collection::vec(0.5..2.0f64, 5..60), spacing in 0.05..0.6f64) {
             let polygon = star(&radii);
-            let tiled = triangulate(&polygon, spacing, 5_000).unwrap();
+            let triangulation = triangulate(&polygon, spacing, 5_000).unwrap();
             let mut sum = 0.0;
-            for face in &tiled.faces {
-                let corners = face.map(|v| tiled.points[v as usize]);
+            for face in &triangulation.faces {
+                let corners = face.map(|v| triangulation.points[v as usize]);
                 let area = signed_area(&corners);
                 prop_assert!(area > 0.0);
                 sum += area;
             }
             prop_assert!((sum - signed_area(&polygon)).abs() < 1e-9);
-            prop_assert_eq!(&tiled.points[..polygon.len()], &polygon[..]);
+            prop_assert_eq!(&triangulation.points[..polygon.len()], &polygon[..]);
         }
     }
 
     #[test]
-    fn a_figure_of_eight_is_refused() {
+    fn a_figure_of_eight_is_an_error() {
         let eight = [
             (0.0, 0.0),
             (1.0, 1.0),
@@ -263,30 +268,33 @@ mod tests {
     }
 
     #[test]
-    fn a_taken_chord_is_split_and_the_tiling_stays() {
+    fn a_taken_chord_is_split_and_the_area_stays() {
         let polygon = star(&[1.0; 8]);
-        let mut tiled = triangulate(&polygon, 10.0, 100).unwrap();
+        let mut triangulation = triangulate(&polygon, 10.0, 100).unwrap();
         let joined = |t: &Triangulation, a: u32, b: u32| {
             t.faces.iter().any(|f| f.contains(&a) && f.contains(&b))
         };
         let pairs = (0..8)
             .flat_map(|a| (a + 2..8).map(move |b| (a, b)))
             .filter(|(a, b)| (a, b) != (&0, &7));
-        let (a, b) = pairs.clone().find(|(a, b)| joined(&tiled, *a, *b)).unwrap();
-        tiled.split_chords(8, |x, y| (x.min(y), x.max(y)) == (a, b));
-        assert!(!joined(&tiled, a, b));
-        assert_eq!(tiled.faces.len(), 8);
-        let area: f64 = tiled
+        let (a, b) = pairs
+            .clone()
+            .find(|(a, b)| joined(&triangulation, *a, *b))
+            .unwrap();
+        triangulation.split_chords(8, |x, y| (x.min(y), x.max(y)) == (a, b));
+        assert!(!joined(&triangulation, a, b));
+        assert_eq!(triangulation.faces.len(), 8);
+        let area: f64 = triangulation
             .faces
             .iter()
-            .map(|f| signed_area(&f.map(|v| tiled.points[v as usize])))
+            .map(|f| signed_area(&f.map(|v| triangulation.points[v as usize])))
             .sum();
         assert!((area - signed_area(&polygon)).abs() < 1e-12);
     }
 
     #[test]
     fn the_number_of_points_is_bounded() {
-        let tiled = triangulate(&star(&[1.0; 30]), 1e-6, 500).unwrap();
-        assert!(tiled.points.len() < 600);
+        let triangulation = triangulate(&star(&[1.0; 30]), 1e-6, 500).unwrap();
+        assert!(triangulation.points.len() < 600);
     }
 }

@@ -1,8 +1,9 @@
-//! A rim that crosses itself in the plane, made simple: vertices near a crossing are smoothed along the rim until none is left.
+//! Makes a rim that crosses itself in the plane a simple polygon: corners near a crossing are smoothed along the rim
+//! until none is left.
 //!
-//! Noise crumples the narrow teeth of a ragged rim, and then the angles of the cloth around a rim vertex add up to more than a full turn:
-//! laid flat, neighbouring teeth overlap. The patch needs the polygon for its triangles and rest lengths only, so moving a few corners by
-//! a fraction of an edge costs nothing that could be seen.
+//! Noise deforms the narrow teeth of a ragged rim. The angles around a rim vertex can then add up to more than a full
+//! turn, and neighbouring teeth overlap in the plane. The patch needs the polygon for its triangles and rest lengths
+//! only, so to move a few corners by a fraction of an edge has no visible effect.
 
 use robust::{Coord, orient2d};
 use rstar::RTree;
@@ -10,11 +11,12 @@ use rstar::primitives::{GeomWithData, Line};
 
 use crate::mesh::Vec2;
 
-/// Most rounds of smoothing; each reaches one vertex further along the rim than the one before.
+/// Most rounds of smoothing; each reaches one corner further along the rim than the one before.
 const ROUNDS: usize = 40;
 
-/// The polygon without crossings, or `None` when smoothing near them does not help (the cloth overlaps itself on a larger scale).
-pub fn untangled(polygon: &[Vec2]) -> Option<Vec<Vec2>> {
+/// The polygon with corners near crossings moved so that none is left, scene units. `None` when that does not help,
+/// because the polygon overlaps itself on a larger scale.
+pub(super) fn untangle(polygon: &[Vec2]) -> Option<Vec<Vec2>> {
     let mut polygon = polygon.to_vec();
     for reach in 0..ROUNDS {
         let tangled = crossed_edges(&polygon);
@@ -26,7 +28,8 @@ pub fn untangled(polygon: &[Vec2]) -> Option<Vec<Vec2>> {
     None
 }
 
-/// Edges (k to k + 1) that cross or touch another edge than their neighbours, or fold back onto a neighbour.
+/// Edges (k: from corner k to k + 1) that cross or touch another edge, or fold back onto a neighbour; to share a corner
+/// is no touch.
 fn crossed_edges(polygon: &[Vec2]) -> Vec<usize> {
     let count = polygon.len();
     let ends = |k: usize| (polygon[k], polygon[(k + 1) % count]);
@@ -45,7 +48,7 @@ fn crossed_edges(polygon: &[Vec2]) -> Vec<usize> {
                     0 => false,
                     1 => folds_back(a, b, d),
                     after if after == count - 1 => folds_back(b, a, c),
-                    _ => touch((a, b), (c, d)),
+                    _ => segments_touch(a, b, c, d),
                 }
             })
     };
@@ -57,25 +60,25 @@ fn folds_back(a: Vec2, b: Vec2, c: Vec2) -> bool {
     side(a, b, c) == 0.0 && (a - b).dot(&(c - b)) > 0.0
 }
 
-/// Whether two closed segments have a point in common.
-fn touch((a, b): (Vec2, Vec2), (c, d): (Vec2, Vec2)) -> bool {
+/// Whether the closed segments from `a` to `b` and from `c` to `d`, whose boxes meet, have a point in common.
+fn segments_touch(a: Vec2, b: Vec2, c: Vec2, d: Vec2) -> bool {
     let (abc, abd, cda, cdb) = (side(a, b, c), side(a, b, d), side(c, d, a), side(c, d, b));
     if [abc, abd, cda, cdb].iter().all(|s| *s == 0.0) {
-        // On one line: they meet if their boxes do, which the search has seen to.
+        // On one line they meet if their boxes do.
         return true;
     }
-    // Signs, not products: a product of tiny orientations could underflow to zero.
+    // Compares signs: a product of tiny orientations could underflow to zero.
     let apart = |x: f64, y: f64| (x > 0.0 && y > 0.0) || (x < 0.0 && y < 0.0);
     !apart(abc, abd) && !apart(cda, cdb)
 }
 
-/// Sign of the turn from a over b to c, exact.
+/// Sign of the turn from a over b to c, exact (Shewchuk's predicate).
 fn side(a: Vec2, b: Vec2, c: Vec2) -> f64 {
     let at = |p: Vec2| Coord { x: p.x, y: p.y };
     orient2d(at(a), at(b), at(c))
 }
 
-/// Marks the ends of the edges and all vertices within `reach` steps of them.
+/// Marks the ends of the edges and all corners within `reach` steps of them.
 fn near(edges: &[usize], count: usize, reach: usize) -> Vec<bool> {
     let mut marked = vec![false; count];
     for edge in edges {
@@ -86,7 +89,7 @@ fn near(edges: &[usize], count: usize, reach: usize) -> Vec<bool> {
     marked
 }
 
-/// Marked vertices halfway to the middle of their neighbours, twice.
+/// Moves marked corners halfway to the middle of their neighbours, twice.
 fn smoothed(polygon: &[Vec2], marked: &[bool]) -> Vec<Vec2> {
     let count = polygon.len();
     let step = |p: &[Vec2]| -> Vec<Vec2> {
@@ -108,7 +111,7 @@ fn smoothed(polygon: &[Vec2], marked: &[bool]) -> Vec<Vec2> {
 mod tests {
     use super::*;
 
-    /// A circle of `n` corners with teeth.
+    /// A circle of `n` corners, every second one farther out.
     fn gear(n: usize) -> Vec<Vec2> {
         let turn = std::f64::consts::TAU / n as f64;
         (0..n)
@@ -120,26 +123,26 @@ mod tests {
     }
 
     #[test]
-    fn a_simple_polygon_is_left_alone() {
-        assert_eq!(untangled(&gear(40)), Some(gear(40)));
+    fn a_simple_polygon_stays_as_it_is() {
+        assert_eq!(untangle(&gear(40)), Some(gear(40)));
     }
 
     #[test]
-    fn a_tooth_pushed_over_its_neighbours_is_taken_back() {
+    fn a_corner_moved_past_its_neighbours_is_moved_back() {
         let mut polygon = gear(40);
         polygon[7] = polygon[10];
         polygon[8] = polygon[5] * 1.01;
         assert!(!crossed_edges(&polygon).is_empty());
-        let simple = untangled(&polygon).unwrap();
+        let simple = untangle(&polygon).unwrap();
         assert!(crossed_edges(&simple).is_empty());
         assert_eq!(
             simple[25], polygon[25],
-            "far from the crossing nothing moves"
+            "corners far from the crossing stay"
         );
     }
 
     #[test]
-    fn a_spike_folded_onto_itself_is_seen() {
+    fn a_spike_folded_onto_itself_counts_as_crossing() {
         let spike = [(0.0, 0.0), (2.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
             .map(|(x, y)| Vec2::new(x, y));
         assert!(!crossed_edges(&spike).is_empty());

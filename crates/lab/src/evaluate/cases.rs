@@ -1,18 +1,18 @@
-//! Held-out cases: clean samples with the shape and size of their holes, and noise for those who want it.
+//! Held-out cases: samples without noise, with the shape and size of their holes; noise is added on request.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
-use crate::scarffolds::masks::Shape;
-use crate::scarffolds::samples::{Sample, Sampler, bounds};
+use crate::scarffolds::masks::MaskShape;
+use crate::scarffolds::samples::{CellSpan, Sampler, TrainingSample, spans};
 use darn_geometry::grid::{CELLS, Grid, SIDE};
 use darn_geometry::mesh::Vec3;
 
-/// How large a hole is: the larger side of its box, as a share of the grid's side.
+/// Size of a hole: the longer side of its bounding box, as a share of the grid's side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Size {
+pub enum HoleSize {
     /// Below 0.4.
     Small,
     /// From 0.4.
@@ -23,51 +23,56 @@ pub enum Size {
     Huge,
 }
 
-impl Size {
+impl HoleSize {
     /// All sizes, ascending.
-    pub const ALL: [Size; 4] = [Size::Small, Size::Middle, Size::Large, Size::Huge];
+    pub const ALL: [HoleSize; 4] = [
+        HoleSize::Small,
+        HoleSize::Middle,
+        HoleSize::Large,
+        HoleSize::Huge,
+    ];
 
-    /// The size of a share.
-    pub fn of(extent: f64) -> Size {
+    /// The size of an extent, a share of the grid's side.
+    pub fn of(extent: f64) -> HoleSize {
         match extent {
-            x if x < 0.4 => Size::Small,
-            x if x < 0.55 => Size::Middle,
-            x if x < 0.7 => Size::Large,
-            _ => Size::Huge,
+            x if x < 0.4 => HoleSize::Small,
+            x if x < 0.55 => HoleSize::Middle,
+            x if x < 0.7 => HoleSize::Large,
+            _ => HoleSize::Huge,
         }
     }
 
-    /// Its bounds, for a table.
+    /// Its limits, for tables.
     pub fn name(self) -> &'static str {
         match self {
-            Size::Small => "extent < 0.40",
-            Size::Middle => "extent 0.40-0.55",
-            Size::Large => "extent 0.55-0.70",
-            Size::Huge => "extent > 0.70",
+            HoleSize::Small => "extent < 0.40",
+            HoleSize::Middle => "extent 0.40-0.55",
+            HoleSize::Large => "extent 0.55-0.70",
+            HoleSize::Huge => "extent > 0.70",
         }
     }
 }
 
-/// A clean sample and what its hole is like.
+/// A sample without noise, and its hole.
 #[derive(Debug, Clone)]
-pub struct Case {
-    /// The sample; truth in the network's units, without noise.
-    pub sample: Sample,
+pub struct EvaluationCase {
+    /// The sample; the truth is in the network's units.
+    pub sample: TrainingSample,
     /// Shape of its first hole.
-    pub shape: Shape,
-    /// Its size.
-    pub size: Size,
+    pub shape: MaskShape,
+    /// Size of its holes.
+    pub size: HoleSize,
 }
 
-/// The first `count` cases of a seed: case `k` is cut from sheet `k` modulo their number and depends on nothing but the seed and `k`.
-pub fn draw(sampler: &Sampler, count: usize, seed: u64) -> Vec<Case> {
+/// The first `count` cases of a seed. Case `k` is cut from sheet `k` modulo the number of sheets and depends on the seed and `k` only.
+pub fn draw(sampler: &Sampler, count: usize, seed: u64) -> Vec<EvaluationCase> {
     (0..count)
         .map(|k| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             rng.set_stream(k as u64);
             let (shape, sample) = sampler.clean_sample_of(k % sampler.sheets(), &mut rng);
-            let size = Size::of(extent(&sample.hole));
-            Case {
+            let size = HoleSize::of(extent(&sample.hole));
+            EvaluationCase {
                 sample,
                 shape,
                 size,
@@ -76,15 +81,15 @@ pub fn draw(sampler: &Sampler, count: usize, seed: u64) -> Vec<Case> {
         .collect()
 }
 
-/// Larger side of a mask's box, as a share of the grid's side.
+/// The longer side of a mask's bounding box, as a share of the grid's side.
 pub(super) fn extent(mask: &[bool]) -> f64 {
-    let sides = bounds(mask).map(|[first, last]| (last + 1).saturating_sub(first));
+    let sides = spans(mask).map(CellSpan::length);
     sides[0].max(sides[1]) as f64 / SIDE as f64
 }
 
-impl Case {
-    /// The case as a scan would give it: known cells with Gaussian noise of `sigma` cells on every coordinate, drawn from `seed`.
-    pub fn seen(&self, sigma: f64, seed: u64) -> Grid {
+impl EvaluationCase {
+    /// The case as a scan would show it: known cells with Gaussian noise of `sigma` cells on every coordinate, drawn from `seed`.
+    pub fn observed(&self, sigma: f64, seed: u64) -> Grid {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut grid = Grid::unknown();
         for k in (0..CELLS).filter(|&k| self.sample.known[k]) {
@@ -95,18 +100,18 @@ impl Case {
         grid
     }
 
-    /// Where a cell is.
+    /// True position of a cell.
     pub fn truth(&self, cell: usize) -> Vec3 {
         Vec3::from(self.sample.truth[cell].map(f64::from))
     }
 
-    /// Everything known, with the truth in the hole.
-    pub fn answer(&self, seen: &Grid) -> Vec<Vec3> {
+    /// The observed positions, with the truth in the hole.
+    pub fn answer(&self, observed: &Grid) -> Vec<Vec3> {
         let at = |k: usize| {
             if self.sample.hole[k] {
                 self.truth(k)
             } else {
-                seen.positions[k]
+                observed.positions[k]
             }
         };
         (0..CELLS).map(at).collect()

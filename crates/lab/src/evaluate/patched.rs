@@ -1,4 +1,5 @@
-//! A filled grid after `patch`: the known cells meshed as a scan whose chart is the grid itself, patched, and read back at the cells.
+//! A filled grid after `patch`: the known cells become a mesh whose chart is the grid itself, the mesh is patched, and the patch is read at
+//! the hole cells.
 
 use darn_geometry::flatten::{Chart, UvSquare};
 use darn_geometry::grid::{CELLS, Grid, cell_centre};
@@ -8,15 +9,15 @@ use darn_geometry::mesh::topology::Topology;
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
 use darn_geometry::patch::{self, Patch, PatchError, PatchOptions, signed_area};
 
-use super::measure::faces;
+use super::metrics::faces;
 
-/// The filled grid with every hole cell where the patch has it. Cells of holes that no patch covers keep the fill.
+/// The filled grid with every hole cell at its position on the patch. Hole cells that no patch covers keep the fill.
 ///
-/// `grid` holds what is known, `filled` one position per cell; `hole` marks the cells to be patched.
+/// `grid` holds the known cells, `filled` one position per cell; `hole` marks the cells to be patched.
 ///
 /// # Errors
 /// See [`patch::build`].
-pub fn patched(
+pub(super) fn patched(
     grid: &Grid,
     hole: &[bool],
     filled: &[Vec3],
@@ -33,9 +34,9 @@ pub fn patched(
         let polygon: Vec<Vec2> = rim
             .vertices
             .iter()
-            .map(|&v| cell_centre(v as usize))
+            .map(|v| cell_centre(v.index()))
             .collect();
-        // Cloth lies left of its boundary, so a hole's rim runs clockwise round it in the chart.
+        // Cloth lies left of its boundary loops, so the rim of a hole is clockwise in the chart.
         let own: Vec<usize> = if signed_area(&polygon) < 0.0 {
             (0..CELLS)
                 .filter(|&k| hole[k] && inside(&polygon, cell_centre(k)))
@@ -46,7 +47,7 @@ pub fn patched(
         if own.is_empty() {
             continue;
         }
-        let Ok(region) = grow(&mesh, &topology, &loops, rim.id as usize, f64::INFINITY) else {
+        let Ok(region) = grow(&mesh, &topology, &loops, rim.id, f64::INFINITY) else {
             continue;
         };
         let chart = grid_chart(&region);
@@ -58,9 +59,9 @@ pub fn patched(
     Ok(answer)
 }
 
-/// The chart in which every cell is where the grid has it; uv and the plane are one.
+/// The chart in which every cell is at its centre on the grid; uv and flat coordinates are the same.
 fn grid_chart(region: &Region) -> Chart {
-    let flat = region.vertices.iter().map(|&v| cell_centre(v as usize));
+    let flat = region.vertices.iter().map(|v| cell_centre(v.index()));
     Chart {
         flat: flat.collect(),
         frame: UvSquare {

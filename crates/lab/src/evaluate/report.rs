@@ -1,112 +1,128 @@
-//! Measures of many cases put together, and their tables.
+//! The measurements of many cases: means and Markdown tables.
 
 use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use super::cases::Size;
-use super::measure::Measures;
-use crate::scarffolds::masks::{SHAPES, Shape};
+use super::cases::HoleSize;
+use super::metrics::FillMetrics;
+use crate::scarffolds::masks::{MaskShape, SHAPES};
 use darn_geometry::grid::SIDE;
 
-/// Who filled the hole.
+/// How the hole was filled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Fill {
-    /// The truth itself: what the measures say of real cloth.
+pub enum FillMethod {
+    /// With the truth: the metrics of real cloth.
     Truth,
-    /// The network.
+    /// By the network.
     Network,
-    /// [`darn_geometry::smooth::Smooth::Membrane`].
+    /// By [`darn_geometry::smooth::Smooth::Membrane`].
     Membrane,
-    /// [`darn_geometry::smooth::Smooth::ThinPlate`].
+    /// By [`darn_geometry::smooth::Smooth::ThinPlate`].
     ThinPlate,
 }
 
-impl Fill {
-    /// All of them, in the order of the tables.
-    pub const ALL: [Fill; 4] = [Fill::Truth, Fill::Network, Fill::Membrane, Fill::ThinPlate];
+impl FillMethod {
+    /// All methods, in the order of the tables.
+    pub const ALL: [FillMethod; 4] = [
+        FillMethod::Truth,
+        FillMethod::Network,
+        FillMethod::Membrane,
+        FillMethod::ThinPlate,
+    ];
 
-    /// For tables and legends.
+    /// Its name in tables and legends.
     pub fn name(self) -> &'static str {
         match self {
-            Fill::Truth => "truth",
-            Fill::Network => "network",
-            Fill::Membrane => "membrane",
-            Fill::ThinPlate => "thin plate",
+            FillMethod::Truth => "truth",
+            FillMethod::Network => "network",
+            FillMethod::Membrane => "membrane",
+            FillMethod::ThinPlate => "thin plate",
         }
     }
 }
 
-/// Before or after the patch.
+/// Whether a fill is measured before or after the patch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Stage {
-    /// The fill as it came.
+pub enum EvaluationStage {
+    /// The fill itself.
     Filled,
-    /// Meshed on the rim and with its lengths restored.
+    /// The patch: meshed from the rim, with its lengths restored.
     Patched,
 }
 
-impl Stage {
-    /// Both.
-    pub const ALL: [Stage; 2] = [Stage::Filled, Stage::Patched];
+impl EvaluationStage {
+    /// Both stages.
+    pub const ALL: [EvaluationStage; 2] = [EvaluationStage::Filled, EvaluationStage::Patched];
 
-    /// For tables.
+    /// Its name in tables.
     pub fn name(self) -> &'static str {
         match self {
-            Stage::Filled => "as filled",
-            Stage::Patched => "after patch",
+            EvaluationStage::Filled => "as filled",
+            EvaluationStage::Patched => "after patch",
         }
     }
 }
 
-/// One fill of one case at one level of noise.
+/// One fill of one case at one noise level and one stage.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Row {
+pub struct EvaluationRow {
     /// Number of the case.
     pub case: usize,
-    /// Shape of its hole.
-    pub shape: Shape,
-    /// Size of its hole.
-    pub size: Size,
+    /// Shape of its first hole.
+    pub shape: MaskShape,
+    /// Size of its holes.
+    pub size: HoleSize,
     /// Standard deviation of the noise on known cells, in cells.
     pub noise: f64,
-    /// Who filled it.
-    pub fill: Fill,
-    /// When it was measured.
-    pub stage: Stage,
-    /// The numbers.
+    /// How it was filled.
+    pub fill: FillMethod,
+    /// Before or after the patch.
+    pub stage: EvaluationStage,
+    /// The metrics.
     #[serde(flatten)]
-    pub measures: Measures,
+    pub metrics: FillMetrics,
 }
 
-/// Everything that was measured.
+/// Angle defects of the hole cells of all cases without noise, radians.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AngleDefects {
+    /// How the holes were filled.
+    pub method: FillMethod,
+    /// Before or after the patch.
+    pub stage: EvaluationStage,
+    /// One number for each hole cell.
+    pub defects: Vec<f64>,
+}
+
+/// All measurements of a run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Report {
-    /// All measurements.
-    pub rows: Vec<Row>,
-    /// Fills that could not be patched.
+pub struct EvaluationReport {
+    /// One row for each measurement.
+    pub rows: Vec<EvaluationRow>,
+    /// Number of fills that could not be patched.
     pub not_patched: usize,
-    /// Angle defects of hole cells without noise, for each fill at each stage; not part of the JSON.
+    /// The angle defects, for each method at each stage; not part of the JSON.
     #[serde(skip)]
-    pub defects: Vec<(Fill, Stage, Vec<f64>)>,
+    pub defects: Vec<AngleDefects>,
 }
 
-impl Report {
-    /// Mean of the rows that are wanted; `None` when there are none.
-    pub fn mean(&self, wanted: impl Fn(&Row) -> bool) -> Option<Measures> {
-        let found: Vec<&Measures> = (self.rows.iter())
+impl EvaluationReport {
+    /// Mean of the rows for which `wanted` is true; `None` when there are none.
+    pub fn mean(&self, wanted: impl Fn(&EvaluationRow) -> bool) -> Option<FillMetrics> {
+        let found: Vec<&FillMetrics> = (self.rows.iter())
             .filter(|row| wanted(row))
-            .map(|row| &row.measures)
+            .map(|row| &row.metrics)
             .collect();
         if found.is_empty() {
             return None;
         }
-        let of = |part: fn(&Measures) -> f64| {
+        let of = |part: fn(&FillMetrics) -> f64| {
             found.iter().map(|m| part(m)).sum::<f64>() / found.len() as f64
         };
-        Some(Measures {
+        Some(FillMetrics {
             rmse: of(|m| m.rmse),
             normal: of(|m| m.normal),
             spacing_mean: of(|m| m.spacing_mean),
@@ -117,7 +133,7 @@ impl Report {
         })
     }
 
-    /// Levels of noise that were measured, ascending.
+    /// The measured noise levels, ascending.
     pub fn noises(&self) -> Vec<f64> {
         let mut all: Vec<f64> = self.rows.iter().map(|row| row.noise).collect();
         all.sort_by(f64::total_cmp);
@@ -148,7 +164,8 @@ impl Report {
             1.0 / SIDE as f64
         );
         for (stage, fill) in stages() {
-            let wanted = |row: &Row| row.noise == 0.0 && row.stage == stage && row.fill == fill;
+            let wanted =
+                |row: &EvaluationRow| row.noise == 0.0 && row.stage == stage && row.fill == fill;
             let Some(m) = self.mean(wanted) else { continue };
             let _ = writeln!(
                 text,
@@ -177,24 +194,24 @@ impl Report {
             let name = format!("{shape:?}").to_lowercase();
             self.hole_line(text, &name, &|row| row.shape == shape);
         }
-        for size in Size::ALL {
+        for size in HoleSize::ALL {
             self.hole_line(text, size.name(), &|row| row.size == size);
         }
     }
 
-    fn hole_line(&self, text: &mut String, name: &str, of: &dyn Fn(&Row) -> bool) {
-        let wanted = |row: &Row, fill: Fill| {
-            row.noise == 0.0 && row.stage == Stage::Patched && row.fill == fill && of(row)
+    fn hole_line(&self, text: &mut String, name: &str, of: &dyn Fn(&EvaluationRow) -> bool) {
+        let wanted = |row: &EvaluationRow, fill: FillMethod| {
+            row.noise == 0.0 && row.stage == EvaluationStage::Patched && row.fill == fill && of(row)
         };
         let count = self
             .rows
             .iter()
-            .filter(|row| wanted(row, Fill::Truth))
+            .filter(|row| wanted(row, FillMethod::Truth))
             .count();
         if count == 0 {
             return;
         }
-        let cell = |fill: Fill| {
+        let cell = |fill: FillMethod| {
             self.mean(|row| wanted(row, fill))
                 .map_or_else(String::new, |m| {
                     format!(
@@ -203,7 +220,12 @@ impl Report {
                     )
                 })
         };
-        let cells = [Fill::Network, Fill::Membrane, Fill::ThinPlate].map(cell);
+        let cells = [
+            FillMethod::Network,
+            FillMethod::Membrane,
+            FillMethod::ThinPlate,
+        ]
+        .map(cell);
         let _ = writeln!(text, "| {name} | {count} | {} |", cells.join(" | "));
     }
 
@@ -241,9 +263,9 @@ impl Report {
     }
 }
 
-/// All fills at all stages, in the order of the tables.
-pub(super) fn stages() -> impl Iterator<Item = (Stage, Fill)> {
-    Stage::ALL
+/// All methods at all stages, in the order of the tables.
+pub(super) fn stages() -> impl Iterator<Item = (EvaluationStage, FillMethod)> {
+    EvaluationStage::ALL
         .into_iter()
-        .flat_map(|stage| Fill::ALL.map(|fill| (stage, fill)))
+        .flat_map(|stage| FillMethod::ALL.map(|fill| (stage, fill)))
 }

@@ -1,24 +1,30 @@
-//! The measurement itself: every case at every level of noise by every fill, before and after the patch.
+//! The measurement: every case at every noise level by every fill method, before and after the patch.
 
 use rayon::prelude::*;
 
-use super::cases::Case;
-use super::measure::{Measured, measure};
+use super::cases::EvaluationCase;
+use super::error::EvaluateError;
+use super::metrics::{Measurement, measure};
 use super::patched::patched;
-use super::report::{Fill, Report, Row, Stage, stages};
-use super::{EvaluateError, Filler};
+use super::report::{
+    AngleDefects, EvaluationReport, EvaluationRow, EvaluationStage, FillMethod, stages,
+};
 use darn_geometry::grid::{CELLS, Grid, NormalGrid, Normalisation};
 use darn_geometry::mesh::Vec3;
 use darn_geometry::patch::PatchOptions;
 use darn_geometry::smooth::{Smooth, smooth};
 
-/// Cases the network gets together.
+/// Grids given to the network at once.
 const CHUNK: usize = 16;
+
+/// Fills grids in the network's units: one list of `CELLS` positions for each grid.
+pub type FillFunction<'a> =
+    &'a (dyn Fn(&[NormalGrid]) -> Result<Vec<Vec<[f32; 3]>>, EvaluateError> + Sync);
 
 /// What is to be measured.
 #[derive(Debug, Clone)]
-pub struct Plan {
-    /// Levels of noise on known cells, in cells.
+pub struct EvaluationPlan {
+    /// Standard deviations of the noise on known cells, in cells.
     pub noises: Vec<f64>,
     /// Seed of the noise.
     pub seed: u64,
@@ -26,101 +32,124 @@ pub struct Plan {
     pub options: PatchOptions,
 }
 
-/// Measures all cases. `progress` is told how many were just finished, once for each level of noise.
+/// Measures all cases. `progress` gets the number of cases just finished, once for each noise level; any thread may call it.
 ///
 /// # Errors
-/// A network that fails, a case with hardly anything known.
+/// A network that fails, a case with hardly any known cells.
 pub fn run(
-    cases: &[Case],
-    plan: &Plan,
-    filler: Filler,
+    cases: &[EvaluationCase],
+    plan: &EvaluationPlan,
+    fill: FillFunction,
     progress: &(dyn Fn(usize) + Sync),
-) -> Result<Report, EvaluateError> {
-    let mut report = Report {
-        defects: stages().map(|(s, f)| (f, s, Vec::new())).collect(),
-        ..Report::default()
+) -> Result<EvaluationReport, EvaluateError> {
+    let nothing = |(stage, method)| AngleDefects {
+        method,
+        stage,
+        defects: Vec::new(),
+    };
+    let mut report = EvaluationReport {
+        defects: stages().map(nothing).collect(),
+        ..EvaluationReport::default()
     };
     for noise in &plan.noises {
         for (number, chunk) in cases.chunks(CHUNK).enumerate() {
             let first = number * CHUNK;
-            let seen = (first..)
+            let observed = (first..)
                 .zip(chunk)
-                .map(|(k, case)| Seen::of(k, case, *noise, plan.seed))
+                .map(|(k, case)| ObservedCase::of(k, case, *noise, plan.seed))
                 .collect::<Result<Vec<_>, _>>()?;
-            let inputs: Vec<NormalGrid> = seen.iter().map(|s| s.grid.normalised(&s.by)).collect();
-            let answers = filler(&inputs)?;
-            let measured: Vec<Vec<Outcome>> = seen
+            let inputs: Vec<NormalGrid> = (observed.iter())
+                .map(|case| case.grid.normalised(&case.normalisation))
+                .collect();
+            let answers = fill(&inputs)?;
+            let measured: Vec<Vec<FillOutcome>> = observed
                 .par_iter()
                 .zip(&answers)
-                .map(|(seen, answer)| {
-                    let found = seen.measured(answer, &plan.options);
+                .map(|(case, answer)| {
+                    let found = case.measured(answer, &plan.options);
                     progress(1);
                     found
                 })
                 .collect::<Result<_, _>>()?;
-            for (seen, outcomes) in seen.iter().zip(measured) {
-                report.add(seen, *noise, outcomes);
+            for (case, outcomes) in observed.iter().zip(measured) {
+                report.add(case, *noise, outcomes);
             }
         }
     }
     Ok(report)
 }
 
-/// What came of one fill at one stage; nothing when it could not be patched.
-type Outcome = (Fill, Stage, Option<Measured>);
-
-/// A case as a scan would give it.
-struct Seen<'a> {
-    number: usize,
-    case: &'a Case,
-    grid: Grid,
-    by: Normalisation,
+/// The measurement of one fill at one stage; `None` when it could not be patched.
+struct FillOutcome {
+    method: FillMethod,
+    stage: EvaluationStage,
+    measurement: Option<Measurement>,
 }
 
-impl<'a> Seen<'a> {
-    fn of(number: usize, case: &'a Case, noise: f64, seed: u64) -> Result<Self, EvaluateError> {
-        let grid = case.seen(noise, seed.wrapping_add(number as u64));
-        let by = grid
+/// A case as a scan would show it.
+struct ObservedCase<'a> {
+    number: usize,
+    case: &'a EvaluationCase,
+    grid: Grid,
+    normalisation: Normalisation,
+}
+
+impl<'a> ObservedCase<'a> {
+    fn of(
+        number: usize,
+        case: &'a EvaluationCase,
+        noise: f64,
+        seed: u64,
+    ) -> Result<Self, EvaluateError> {
+        let grid = case.observed(noise, seed.wrapping_add(number as u64));
+        let normalisation = grid
             .normalisation()
             .ok_or(EvaluateError::TooLittleKnown { sample: number })?;
-        Ok(Seen {
+        Ok(ObservedCase {
             number,
             case,
             grid,
-            by,
+            normalisation,
         })
     }
 
-    /// All fills at both stages.
+    /// All methods at both stages; `answer` is the network's.
     fn measured(
         &self,
         answer: &[[f32; 3]],
         options: &PatchOptions,
-    ) -> Result<Vec<Outcome>, EvaluateError> {
+    ) -> Result<Vec<FillOutcome>, EvaluateError> {
         let hole = &self.case.sample.hole;
         let mut all = Vec::new();
-        for fill in Fill::ALL {
-            let filled = self.filled(fill, answer)?;
-            all.push((fill, Stage::Filled, Some(measure(self.case, &filled))));
+        for method in FillMethod::ALL {
+            let filled = self.filled(method, answer)?;
+            all.push(FillOutcome {
+                method,
+                stage: EvaluationStage::Filled,
+                measurement: Some(measure(self.case, &filled)),
+            });
             let patched = patched(&self.grid, hole, &filled, options).ok();
-            let measured = patched.map(|p| measure(self.case, &p));
-            all.push((fill, Stage::Patched, measured));
+            all.push(FillOutcome {
+                method,
+                stage: EvaluationStage::Patched,
+                measurement: patched.map(|p| measure(self.case, &p)),
+            });
         }
         Ok(all)
     }
 
     /// One position per cell: the scan's where known.
-    fn filled(&self, fill: Fill, answer: &[[f32; 3]]) -> Result<Vec<Vec3>, EvaluateError> {
-        let energy = match fill {
-            Fill::Truth => return Ok(self.case.answer(&self.grid)),
-            Fill::Network if answer.len() == CELLS => {
-                return Ok(self.grid.filled(answer, &self.by));
+    fn filled(&self, method: FillMethod, answer: &[[f32; 3]]) -> Result<Vec<Vec3>, EvaluateError> {
+        let energy = match method {
+            FillMethod::Truth => return Ok(self.case.answer(&self.grid)),
+            FillMethod::Network if answer.len() == CELLS => {
+                return Ok(self.grid.filled(answer, &self.normalisation));
             }
-            Fill::Network => {
+            FillMethod::Network => {
                 return Err(EvaluateError::Nothing("the network's answer is too short"));
             }
-            Fill::Membrane => Smooth::Membrane,
-            Fill::ThinPlate => Smooth::ThinPlate,
+            FillMethod::Membrane => Smooth::Membrane,
+            FillMethod::ThinPlate => Smooth::ThinPlate,
         };
         let filled = smooth(
             &self.grid.positions,
@@ -129,32 +158,33 @@ impl<'a> Seen<'a> {
             energy,
         );
         filled.ok_or(EvaluateError::Singular {
-            fill: fill.name(),
+            fill: method.name(),
             sample: self.number,
         })
     }
 }
 
-impl Report {
-    fn add(&mut self, seen: &Seen, noise: f64, outcomes: Vec<Outcome>) {
-        for (fill, stage, measured) in outcomes {
-            let Some(measured) = measured else {
+impl EvaluationReport {
+    fn add(&mut self, observed: &ObservedCase, noise: f64, outcomes: Vec<FillOutcome>) {
+        for outcome in outcomes {
+            let FillOutcome { method, stage, .. } = outcome;
+            let Some(measurement) = outcome.measurement else {
                 self.not_patched += 1;
                 continue;
             };
-            self.rows.push(Row {
-                case: seen.number,
-                shape: seen.case.shape,
-                size: seen.case.size,
+            self.rows.push(EvaluationRow {
+                case: observed.number,
+                shape: observed.case.shape,
+                size: observed.case.size,
                 noise,
-                fill,
+                fill: method,
                 stage,
-                measures: measured.measures,
+                metrics: measurement.metrics,
             });
-            let of = (fill, stage);
-            let pool = (self.defects.iter_mut()).find(|(f, s, _)| noise == 0.0 && (*f, *s) == of);
-            if let Some((_, _, pool)) = pool {
-                pool.extend(measured.defects);
+            let pool = (self.defects.iter_mut())
+                .find(|pool| noise == 0.0 && pool.method == method && pool.stage == stage);
+            if let Some(pool) = pool {
+                pool.defects.extend(measurement.defects);
             }
         }
     }

@@ -3,31 +3,33 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
+use super::metrics::measure;
+use super::patched::patched;
 use super::*;
-use crate::scarffolds::masks::{self, SHAPES, Shape};
-use crate::scarffolds::samples::{Sample, Sampler, Turning};
-use crate::scarffolds::sheets::Sheet;
+use crate::scarffolds::masks::{self, MaskShape, SHAPES};
+use crate::scarffolds::samples::{SampleRotation, Sampler, TrainingSample};
+use crate::scarffolds::sheets::SimulatedSheet;
 use darn_geometry::grid::{CELLS, SIDE, cell_centre};
 use darn_geometry::mesh::Vec3;
 use darn_geometry::patch::PatchOptions;
 use darn_geometry::smooth::{Smooth, smooth};
 
 /// A case on a surface over the unit square, with a hole of the given shape.
-fn case(surface: impl Fn(f64, f64) -> Vec3, shape: Shape, seed: u64) -> Case {
+fn case(surface: impl Fn(f64, f64) -> Vec3, shape: MaskShape, seed: u64) -> EvaluationCase {
     let hole = masks::draw_shape(shape, &mut ChaCha8Rng::seed_from_u64(seed));
     let truth = (0..CELLS).map(cell_centre).map(|uv| {
         let p = surface(uv.x, uv.y);
         [p.x as f32, p.y as f32, p.z as f32]
     });
-    Case {
-        sample: Sample {
+    EvaluationCase {
+        sample: TrainingSample {
             truth: truth.collect(),
             valid: vec![true; CELLS],
             known: hole.iter().map(|h| !h).collect(),
             hole,
         },
         shape,
-        size: Size::Middle,
+        size: HoleSize::Middle,
     }
 }
 
@@ -44,8 +46,8 @@ fn cylinder(u: f64, v: f64) -> Vec3 {
 fn the_truth_has_no_error_and_its_own_spacing() {
     for (shape, _) in SHAPES {
         let case = case(cylinder, shape, 4);
-        let found = measure(&case, &case.answer(&case.seen(0.0, 1)));
-        let m = found.measures;
+        let found = measure(&case, &case.answer(&case.observed(0.0, 1)));
+        let m = found.metrics;
         assert!(m.rmse < 1e-6 && m.normal < 1e-3, "{m:?}");
         assert!((m.spacing_mean * 64.0 - 1.0).abs() < 1e-3 && m.spacing_variance < 1e-10);
         assert!((m.area - 1.0).abs() < 1e-9 && m.self_intersections == 0.0);
@@ -60,42 +62,42 @@ fn the_truth_has_no_error_and_its_own_spacing() {
 
 #[test]
 fn errors_are_in_cells() {
-    let case = case(plane, Shape::Circle, 2);
-    let mut answer = case.answer(&case.seen(0.0, 1));
+    let case = case(plane, MaskShape::Circle, 2);
+    let mut answer = case.answer(&case.observed(0.0, 1));
     for k in (0..CELLS).filter(|&k| case.sample.hole[k]) {
         answer[k] += Vec3::new(0.0, 0.0, 3.0 / SIDE as f64);
     }
-    assert!((measure(&case, &answer).measures.rmse - 3.0).abs() < 1e-6);
+    assert!((measure(&case, &answer).metrics.rmse - 3.0).abs() < 1e-6);
 }
 
 #[test]
 fn cloth_through_cloth_is_counted() {
-    let case = case(plane, Shape::Circle, 2);
-    let mut answer = case.answer(&case.seen(0.0, 1));
+    let case = case(plane, MaskShape::Circle, 2);
+    let mut answer = case.answer(&case.observed(0.0, 1));
     let inner: Vec<usize> = (0..CELLS).filter(|&k| case.sample.hole[k]).collect();
     let (middle, away) = (inner[inner.len() / 2], Vec3::new(0.8, 0.0, -0.6));
     // One cell is pulled through the sheet some cells further on.
     answer[middle] = case.truth(middle + 8) - away * 0.01;
     answer[middle + 1] = case.truth(middle + 8) + away * 0.01;
-    assert!(measure(&case, &answer).measures.self_intersections > 0.0);
+    assert!(measure(&case, &answer).metrics.self_intersections > 0.0);
 }
 
 #[test]
 fn both_smooth_fills_keep_a_plane_and_only_the_plate_keeps_a_bend() {
-    let worst = |case: &Case, energy| {
-        let seen = case.seen(0.0, 1);
+    let worst = |case: &EvaluationCase, energy| {
+        let seen = case.observed(0.0, 1);
         let filled = smooth(&seen.positions, &seen.known, &case.sample.hole, energy).unwrap();
-        measure(case, &filled).measures.rmse
+        measure(case, &filled).metrics.rmse
     };
     let parabola = |u: f64, v: f64| Vec3::new(u, v, (u - 0.5) * (v - 0.5));
-    for shape in [Shape::Circle, Shape::Percolation, Shape::Ring] {
+    for shape in [MaskShape::Circle, MaskShape::Percolation, MaskShape::Ring] {
         for energy in [Smooth::Membrane, Smooth::ThinPlate] {
             assert!(worst(&case(plane, shape, 7), energy) < 1e-4);
             // u·v is harmonic and biharmonic, discretely too.
             assert!(worst(&case(parabola, shape, 7), energy) < 1e-4);
         }
     }
-    let bent = case(|u, v| Vec3::new(u, v, u * u + v * v), Shape::Circle, 7);
+    let bent = case(|u, v| Vec3::new(u, v, u * u + v * v), MaskShape::Circle, 7);
     let (membrane, plate) = (
         worst(&bent, Smooth::Membrane),
         worst(&bent, Smooth::ThinPlate),
@@ -107,7 +109,7 @@ fn both_smooth_fills_keep_a_plane_and_only_the_plate_keeps_a_bend() {
 fn patches_reach_every_hole_cell_and_keep_flat_cloth_flat() {
     for (shape, _) in SHAPES {
         let case = case(plane, shape, 12);
-        let grid = case.seen(0.0, 1);
+        let grid = case.observed(0.0, 1);
         let mut filled = case.answer(&grid);
         let nowhere = Vec3::new(9.0, 9.0, 9.0);
         let truth = filled.clone();
@@ -129,8 +131,8 @@ fn patches_reach_every_hole_cell_and_keep_flat_cloth_flat() {
 
 #[test]
 fn noise_is_on_known_cells_alone_and_of_the_strength_asked_for() {
-    let case = case(cylinder, Shape::Blob, 3);
-    let (clean, noisy) = (case.seen(0.0, 5), case.seen(0.2, 5));
+    let case = case(cylinder, MaskShape::Blob, 3);
+    let (clean, noisy) = (case.observed(0.0, 5), case.observed(0.2, 5));
     let known: Vec<usize> = (0..CELLS).filter(|&k| clean.known[k]).collect();
     let squares: f64 = known
         .iter()
@@ -138,24 +140,24 @@ fn noise_is_on_known_cells_alone_and_of_the_strength_asked_for() {
         .sum();
     let sigma = (squares / (3 * known.len()) as f64).sqrt() * SIDE as f64;
     assert!((sigma - 0.2).abs() < 0.01, "{sigma}");
-    assert_eq!(case.seen(0.2, 5), noisy);
+    assert_eq!(case.observed(0.2, 5), noisy);
 }
 
-fn rolled() -> Sheet {
+fn rolled() -> SimulatedSheet {
     let positions = (0..51 * 51).map(|k| {
         let p = cylinder((k % 51) as f64 / 50.0, (k / 51) as f64 / 50.0);
         [p.x as f32, p.y as f32, p.z as f32]
     });
-    Sheet {
+    SimulatedSheet {
         positions: positions.collect(),
     }
 }
 
 #[test]
 fn a_whole_evaluation_has_its_tables_and_pictures() {
-    let sampler = Sampler::new(&[rolled()], Turning::Any);
+    let sampler = Sampler::new(&[rolled()], SampleRotation::Any);
     let cases = draw(&sampler, 3, 9);
-    let plan = Plan {
+    let plan = EvaluationPlan {
         noises: vec![0.0, 0.2],
         seed: 1,
         options: PatchOptions::default(),
@@ -170,13 +172,16 @@ fn a_whole_evaluation_has_its_tables_and_pictures() {
             .mean(|r| r.fill == fill && r.stage == stage && r.noise == 0.0)
             .unwrap()
     };
-    assert!(of(Fill::Truth, Stage::Filled).rmse < 1e-6);
-    assert!(of(Fill::Network, Stage::Filled).rmse > of(Fill::ThinPlate, Stage::Filled).rmse);
+    assert!(of(FillMethod::Truth, EvaluationStage::Filled).rmse < 1e-6);
+    assert!(
+        of(FillMethod::Network, EvaluationStage::Filled).rmse
+            > of(FillMethod::ThinPlate, EvaluationStage::Filled).rmse
+    );
     let text = report.markdown();
     for word in ["truth", "network", "thin plate", "after patch", "By noise"] {
         assert!(text.contains(word), "{text}");
     }
-    assert_eq!(picture(&report).dimensions(), (1100, 3 * 520));
+    assert!(picture(&report).contains("viewBox=\"0 0 1100 1560\""));
     let json = serde_json::to_value(&report).unwrap();
     assert_eq!(json["rows"][0]["fill"], "truth");
     assert!(json["rows"][0]["rmse"].is_number());
@@ -184,9 +189,9 @@ fn a_whole_evaluation_has_its_tables_and_pictures() {
 
 #[test]
 fn shares_of_samples_and_scans_are_shares() {
-    let sampler = Sampler::new(&[rolled()], Turning::Any);
+    let sampler = Sampler::new(&[rolled()], SampleRotation::Any);
     let trained = of_samples(&draw(&sampler, 5, 2));
-    for cut in Cut::ALL {
+    for cut in HoleKind::ALL {
         for share in of_flattened(&[rolled()], cut, 3)
             .into_iter()
             .flatten()

@@ -1,15 +1,15 @@
-//! Sheets for people: each as a GLB that any viewer opens, and many in one picture.
+//! Sheets for viewing: one as a GLB, or many in one picture.
 
-use super::cloth::SIDE;
-use super::sheets::Sheet;
+use super::lattice::SIDE;
+use super::sheet::SimulatedSheet;
 use darn_geometry::mesh::curvature::vertex_normals;
 use darn_geometry::mesh::{TriMesh, Vec3};
 use darn_gltf_scan::ScanError;
-use darn_gltf_scan::export::{Fresh, glb};
-use darn_render::{Aim, CLOTH, Framing, Lines, View, picture};
+use darn_gltf_scan::export::{NewMesh, glb};
+use darn_render::{CLOTH, CameraDirection, EdgeLines, Framing, PictureOptions, picture};
 use image::RgbImage;
 
-/// Columns of a contact sheet.
+/// Pictures in a row of a contact sheet.
 const COLUMNS: u32 = 4;
 /// Width and height of a sheet's picture in a contact sheet.
 const TILE: [u32; 2] = [480, 400];
@@ -18,7 +18,7 @@ const TILE: [u32; 2] = [480, 400];
 ///
 /// # Errors
 /// See [`glb`].
-pub fn as_glb(sheet: &Sheet, name: &str) -> Result<Vec<u8>, ScanError> {
+pub fn as_glb(sheet: &SimulatedSheet, name: &str) -> Result<Vec<u8>, ScanError> {
     let mesh = upright(sheet);
     let triple = |p: &Vec3| [p.x as f32, p.y as f32, p.z as f32];
     let positions: Vec<[f32; 3]> = mesh.positions.iter().map(triple).collect();
@@ -27,7 +27,7 @@ pub fn as_glb(sheet: &Sheet, name: &str) -> Result<Vec<u8>, ScanError> {
     let texcoords: Vec<[f32; 2]> = (0..positions.len())
         .map(|k| [along(k % SIDE), 1.0 - along(k / SIDE)])
         .collect();
-    glb(&Fresh {
+    glb(&NewMesh {
         name,
         positions: &positions,
         normals: &normals,
@@ -36,18 +36,18 @@ pub fn as_glb(sheet: &Sheet, name: &str) -> Result<Vec<u8>, ScanError> {
     })
 }
 
-/// The sheets in one picture, four a row, each from slightly above.
-pub fn contact_sheet(sheets: &[&Sheet]) -> RgbImage {
+/// The sheets in one picture, four in a row, each seen from above at 35°.
+pub fn contact_sheet(sheets: &[&SimulatedSheet]) -> RgbImage {
     let rows = (sheets.len() as u32).div_ceil(COLUMNS).max(1);
     let mut all = RgbImage::new(COLUMNS * TILE[0], rows * TILE[1]);
-    let view = View {
+    let view = PictureOptions {
         size: TILE,
-        aim: Aim::Angles {
+        direction: CameraDirection::Angles {
             azimuth: 30.0,
             elevation: 35.0,
         },
         framing: Framing::Whole,
-        lines: Lines::Rims,
+        lines: EdgeLines::Rims,
     };
     for (place, sheet) in
         (0..rows * COLUMNS).zip(sheets.iter().map(Some).chain(std::iter::repeat(None)))
@@ -60,8 +60,8 @@ pub fn contact_sheet(sheets: &[&Sheet]) -> RgbImage {
     all
 }
 
-/// The sheet's mesh with +y up: a turn about x, so that it is not mirrored.
-fn upright(sheet: &Sheet) -> TriMesh {
+/// The sheet's mesh with +y up: rotated about x, not mirrored.
+fn upright(sheet: &SimulatedSheet) -> TriMesh {
     let mut mesh = sheet.mesh();
     for p in &mut mesh.positions {
         *p = Vec3::new(p.x, p.z, -p.y);
@@ -75,7 +75,7 @@ mod tests {
     use darn_gltf_scan::{Scan, ScanLimits};
 
     /// A flat sheet that rises along v.
-    fn ramp() -> Sheet {
+    fn ramp() -> SimulatedSheet {
         let along = |k: usize| k as f32 / (SIDE - 1) as f32;
         let at = |k: usize| {
             [
@@ -84,25 +84,25 @@ mod tests {
                 0.6 * along(k / SIDE),
             ]
         };
-        Sheet {
+        SimulatedSheet {
             positions: (0..SIDE * SIDE).map(at).collect(),
         }
     }
 
     #[test]
-    fn what_is_high_in_the_simulation_is_high_in_the_scan() {
-        let scan = Scan::read(&as_glb(&ramp(), "ramp").unwrap(), &ScanLimits::default()).unwrap();
+    fn height_in_the_simulation_is_height_in_the_scan() {
+        let scan = Scan::read(as_glb(&ramp(), "ramp").unwrap(), &ScanLimits::default()).unwrap();
         assert_eq!(scan.surface.faces.len(), 2 * (SIDE - 1) * (SIDE - 1));
         for (p, q) in scan.surface.positions.iter().zip(ramp().positions) {
             assert_eq!([p.x, p.y, p.z], [q[0], q[2], -q[1]].map(f64::from));
         }
-        // Counter-clockwise faces look upwards, as the simulation's do.
+        // Normals of the faces point up, as in the simulation.
         let normal = vertex_normals(&upright(&ramp()))[0];
         assert!(normal.y > 0.7, "{normal}");
     }
 
     #[test]
-    fn a_contact_sheet_has_room_for_all() {
+    fn a_contact_sheet_is_large_enough_for_all_sheets() {
         let sheet = ramp();
         assert_eq!(contact_sheet(&[&sheet; 5]).dimensions(), (1920, 800));
         assert_eq!(contact_sheet(&[]).dimensions(), (1920, 400));

@@ -1,39 +1,38 @@
-//! Vectors on the vertices of a sheet, row by row and axis by axis, and the projections of whole rows at once.
+//! Vectors on the vertices of a sheet, stored by row and by axis, and constraints that are projected for whole rows at once.
 //!
-//! A row is three runs of `WIDTH` numbers, so that a constraint between two rows is one loop the compiler turns into vector
-//! instructions; constraints along a row are constraints between rows of the transposed field. The columns from `SIDE` on are padding
-//! that nothing reads.
+//! A row is three arrays of `WIDTH` numbers, so that the compiler turns a constraint between two rows into vector instructions. Constraints
+//! along a row are constraints between rows of the transposed field. Columns from `SIDE` on are padding that nothing reads.
 
-use super::cloth::{Point, SIDE};
+use super::lattice::{SIDE, Vec3f};
 
-/// Length of a run: `SIDE` and padding to a multiple of eight.
-pub const WIDTH: usize = 56;
+/// Columns of a row: `SIDE`, padded to a multiple of eight.
+pub(super) const WIDTH: usize = 56;
 
-/// One axis of a row.
-pub type Run = [f32; WIDTH];
+/// One number for every column of a row.
+pub(super) type AxisRow = [f32; WIDTH];
 /// x, y and z of a row.
-pub type Row = [Run; 3];
+pub(super) type FieldRow = [AxisRow; 3];
 
 /// A vector for every vertex of a sheet.
 #[derive(Debug, Clone)]
-pub struct Field {
+pub(super) struct VertexField {
     /// `SIDE` rows.
-    pub rows: Vec<Row>,
+    pub rows: Vec<FieldRow>,
 }
 
-/// A number for every vertex, with the same padding.
-pub type Weights = Vec<Run>;
+/// The inverse mass of every vertex, 0 where it is pinned, by row.
+pub(super) type InverseMasses = Vec<AxisRow>;
 
-impl Field {
+impl VertexField {
     /// All zero.
-    pub fn zeros() -> Self {
+    pub(super) fn zeros() -> Self {
         Self {
             rows: vec![[[0.0; WIDTH]; 3]; SIDE],
         }
     }
 
     /// From one point for each vertex, row by row.
-    pub fn from_points(points: &[Point]) -> Self {
+    pub(super) fn from_points(points: &[Vec3f]) -> Self {
         let mut field = Self::zeros();
         for (k, p) in points.iter().enumerate() {
             field.set(slot(k), p);
@@ -42,20 +41,20 @@ impl Field {
     }
 
     /// One point for each vertex, row by row.
-    pub fn points(&self) -> Vec<Point> {
+    pub(super) fn points(&self) -> Vec<Vec3f> {
         (0..SIDE * SIDE).map(|k| self.at(slot(k))).collect()
     }
 
     /// The vector in a slot.
     #[inline(always)]
-    pub fn at(&self, slot: usize) -> Point {
+    pub(super) fn at(&self, slot: usize) -> Vec3f {
         let flat = self.rows.as_flattened().as_flattened();
-        Point::new(flat[slot], flat[slot + WIDTH], flat[slot + 2 * WIDTH])
+        Vec3f::new(flat[slot], flat[slot + WIDTH], flat[slot + 2 * WIDTH])
     }
 
     /// Replaces the vector in a slot.
     #[inline(always)]
-    pub fn set(&mut self, slot: usize, p: &Point) {
+    pub(super) fn set(&mut self, slot: usize, p: &Vec3f) {
         let flat = self.rows.as_flattened_mut().as_flattened_mut();
         flat[slot] = p.x;
         flat[slot + WIDTH] = p.y;
@@ -63,7 +62,7 @@ impl Field {
     }
 
     /// Writes the transposed field into `other`.
-    pub fn transpose_into(&self, other: &mut Self) {
+    pub(super) fn transpose_into(&self, other: &mut Self) {
         for (j, row) in self.rows.iter().enumerate() {
             for (axis, run) in row.iter().enumerate() {
                 for (target, value) in other.rows.iter_mut().zip(run) {
@@ -74,38 +73,52 @@ impl Field {
     }
 }
 
-/// Where vertex `k`'s x stands in a field; y and z follow at `WIDTH` and 2 `WIDTH`.
+/// Index of vertex `k`'s x in a flattened field; y and z follow at `WIDTH` and 2 `WIDTH`.
 #[inline(always)]
-pub fn slot(k: usize) -> usize {
+pub(super) fn slot(k: usize) -> usize {
     k / SIDE * 3 * WIDTH + k % SIDE
 }
 
-/// A distance to keep, and how far it gives: 0 is hard, 1/(stiffness · step²) soft.
+/// The inverse mass of the vertex in a slot.
+pub(super) fn inverse_mass(masses: &InverseMasses, slot: usize) -> f32 {
+    masses[slot / (3 * WIDTH)][slot % WIDTH]
+}
+
+/// A distance between two vertices that a projection restores.
 #[derive(Debug, Clone, Copy)]
-pub struct Link {
-    /// The distance.
+pub(super) struct DistanceConstraint {
+    /// The distance, metres.
     pub rest: f32,
-    /// XPBD's compliance.
+    /// XPBD's compliance: 0 is hard, 1/(stiffness · step²) soft.
     pub compliance: f32,
+}
+
+/// One row that a constraint moves, and the inverse masses of its vertices.
+pub(super) struct WeightedRow<'a> {
+    /// Positions.
+    pub row: &'a mut FieldRow,
+    /// Inverse masses.
+    pub masses: &'a AxisRow,
 }
 
 /// Projects the distances between column `i + A` of one row and column `i + B` of another, for `N` columns.
 #[inline(always)]
-pub fn link_rows<const A: usize, const B: usize, const N: usize>(
-    link: Link,
-    [a, b]: [&mut Row; 2],
-    [wa, wb]: [&Run; 2],
+pub(super) fn link_rows<const A: usize, const B: usize, const N: usize>(
+    constraint: DistanceConstraint,
+    a: WeightedRow,
+    b: WeightedRow,
 ) {
-    let [ax, ay, az] = a;
-    let [bx, by, bz] = b;
+    let (wa, wb) = (a.masses, b.masses);
+    let [ax, ay, az] = a.row;
+    let [bx, by, bz] = b.row;
     for i in 0..N {
         let (p, q) = (i + A, i + B);
         let d = [bx[q] - ax[p], by[q] - ay[p], bz[q] - az[p]];
         let length = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
             .max(1.0e-14)
             .sqrt();
-        let give = (wa[p] + wb[q] + link.compliance).max(1.0e-6);
-        let push = (length - link.rest) / (length * give);
+        let give = (wa[p] + wb[q] + constraint.compliance).max(1.0e-6);
+        let push = (length - constraint.rest) / (length * give);
         let (pa, pb) = (push * wa[p], push * wb[q]);
         ax[p] += d[0] * pa;
         ay[p] += d[1] * pa;
@@ -116,15 +129,22 @@ pub fn link_rows<const A: usize, const B: usize, const N: usize>(
     }
 }
 
-/// Projects the second differences over three rows at columns `i + A`, the middle of both, and `i + C`, for `N` columns.
+/// Projects the second differences over three rows at column `i + A` of the first, `i + C` of the last and the column halfway between
+/// them, for `N` columns.
 #[inline(always)]
-pub fn straighten_rows<const A: usize, const C: usize, const N: usize>(
+pub(super) fn straighten_rows<const A: usize, const C: usize, const N: usize>(
     compliance: f32,
-    [a, b, c]: [&mut Row; 3],
-    [wa, wb, wc]: [&Run; 3],
+    first: WeightedRow,
+    middle: WeightedRow,
+    last: WeightedRow,
 ) {
+    let (wa, wb, wc) = (first.masses, middle.masses, last.masses);
     for axis in 0..3 {
-        let (a, b, c) = (&mut a[axis], &mut b[axis], &mut c[axis]);
+        let (a, b, c) = (
+            &mut first.row[axis],
+            &mut middle.row[axis],
+            &mut last.row[axis],
+        );
         for i in 0..N {
             let (p, q, r) = (i + A, i + (A + C) / 2, i + C);
             let error = a[p] - 2.0 * b[q] + c[r];
@@ -136,13 +156,13 @@ pub fn straighten_rows<const A: usize, const C: usize, const N: usize>(
     }
 }
 
-/// Brings a row's points that are further from `pin` than `reach2` (squared, for each column) back to that distance.
-pub fn tether_row(row: &mut Row, weight: &Run, pin: &Point, reach2: &Run) {
+/// Moves vertices of a row that are further from `pin` than the square root of their `reach2` back to that distance.
+pub(super) fn tether_row(row: &mut FieldRow, masses: &AxisRow, pin: &Vec3f, reach2: &AxisRow) {
     let [x, y, z] = row;
     for i in 0..WIDTH {
         let d = [x[i] - pin.x, y[i] - pin.y, z[i] - pin.z];
         let far2 = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).max(1.0e-14);
-        let back = weight[i] * (1.0 - (reach2[i] / far2).min(1.0).sqrt());
+        let back = masses[i] * (1.0 - (reach2[i] / far2).min(1.0).sqrt());
         x[i] -= back * d[0];
         y[i] -= back * d[1];
         z[i] -= back * d[2];

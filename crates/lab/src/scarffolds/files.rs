@@ -1,23 +1,25 @@
-//! The files of a folder of sheets: writing whole ones only, reading finished or growing folders.
+//! The files of a folder of sheets: reading finished or growing folders, and writing so that no reader sees half a file.
 
-use super::cloth::{SIDE, VERTICES};
-use super::sheets::{Manifest, Record, ScarfError, Sheet};
+use super::error::ScarfError;
+use super::lattice::{SIDE, VERTICES};
+use super::manifest::{Manifest, SheetRecord};
+use super::sheet::SimulatedSheet;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// All sheets of a finished set.
+/// Name of the file with all sheets of a finished set.
 pub(super) const WHOLE: &str = "sheets.safetensors";
-/// The record of a finished set.
+/// Name of the file with the records of a finished set.
 pub(super) const MANIFEST: &str = "manifest.json";
 
-/// What a part file says of its sheets.
+/// The header of a part file.
 #[derive(Serialize, Deserialize)]
 pub(super) struct PartHeader {
     pub version: u32,
     pub seed: u64,
-    pub sheets: Vec<Record>,
+    pub sheets: Vec<SheetRecord>,
 }
 
 /// Name of the part file whose first sheet is number `start`.
@@ -25,11 +27,11 @@ pub(super) fn part_name(start: usize) -> String {
     format!("part-{start:06}.safetensors")
 }
 
-/// Reads all sheets of a folder: the merged file, or, while they are still being made, the parts that are finished.
+/// Reads all sheets of a folder: the merged file or, while the set is still being made, the finished parts.
 ///
 /// # Errors
 /// Unreadable files, tensors of another shape, no sheets at all.
-pub fn read(dir: &Path) -> Result<Vec<Sheet>, ScarfError> {
+pub fn read(dir: &Path) -> Result<Vec<SimulatedSheet>, ScarfError> {
     let whole = dir.join(WHOLE);
     if whole.exists() {
         return read_sheets(&whole);
@@ -59,7 +61,7 @@ pub fn read(dir: &Path) -> Result<Vec<Sheet>, ScarfError> {
 /// Reads `manifest.json` of a finished folder.
 ///
 /// # Errors
-/// An unreadable or foreign file.
+/// A file that cannot be read or has another format.
 pub fn read_manifest(dir: &Path) -> Result<Manifest, ScarfError> {
     let path = dir.join(MANIFEST);
     let text = std::fs::read(&path).map_err(|source| ScarfError::Io {
@@ -79,7 +81,7 @@ pub(super) fn format_error(path: &Path, reason: &str) -> ScarfError {
 /// Writes sheets, with the records of a part in the header.
 pub(super) fn write_file(
     path: &Path,
-    sheets: &[Sheet],
+    sheets: &[SimulatedSheet],
     header: Option<&PartHeader>,
 ) -> Result<(), ScarfError> {
     let bytes: Vec<u8> = sheets
@@ -103,7 +105,7 @@ pub(super) fn write_file(
     write_whole(path, &file)
 }
 
-/// Writes beside the file and renames, so that a reader never sees half of it.
+/// Writes another file and renames it, so that a reader never sees half a file.
 pub(super) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), ScarfError> {
     let beside = path.with_extension("unfinished");
     std::fs::write(&beside, bytes)
@@ -114,7 +116,7 @@ pub(super) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), ScarfError> {
         })
 }
 
-fn read_sheets(path: &Path) -> Result<Vec<Sheet>, ScarfError> {
+fn read_sheets(path: &Path) -> Result<Vec<SimulatedSheet>, ScarfError> {
     let bytes = std::fs::read(path).map_err(|source| ScarfError::Io {
         path: path.into(),
         source,
@@ -132,7 +134,7 @@ fn read_sheets(path: &Path) -> Result<Vec<Sheet>, ScarfError> {
     Ok(tensor
         .data()
         .chunks_exact(VERTICES * 12)
-        .map(|sheet| Sheet {
+        .map(|sheet| SimulatedSheet {
             positions: sheet
                 .as_chunks::<12>()
                 .0
@@ -149,7 +151,7 @@ fn read_sheets(path: &Path) -> Result<Vec<Sheet>, ScarfError> {
 }
 
 /// Reads a part file with its records.
-pub(super) fn read_part(path: &Path) -> Result<(Vec<Sheet>, PartHeader), ScarfError> {
+pub(super) fn read_part(path: &Path) -> Result<(Vec<SimulatedSheet>, PartHeader), ScarfError> {
     let fail = |reason: String| format_error(path, &reason);
     let sheets = read_sheets(path)?;
     let bytes = std::fs::read(path).map_err(|source| ScarfError::Io {

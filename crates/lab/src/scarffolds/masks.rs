@@ -1,7 +1,7 @@
 //! Holes on the 64×64 grid: circle, ring and percolation as in the paper, and the tears and ragged blobs that worn cloth has.
 //!
-//! A hole takes about 0.3 to 0.65 of the grid's side, as in the regions that `flatten` cuts out, sometimes up to 0.88, and stays clear of the grid's border.
-//! A mask is `CELLS` flags, true in the hole, in the grid's order.
+//! A hole takes about 0.3 to 0.65 of the grid's side, as in the regions that `flatten` cuts out, sometimes up to 0.88. It never touches the
+//! grid's border. A mask is `CELLS` flags in the grid's order, true in the hole.
 
 use darn_geometry::grid::{CELLS, SIDE};
 use rand::Rng;
@@ -9,50 +9,44 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::f32::consts::{PI, TAU};
 
-/// Cells between a hole and the grid's border, at least.
-pub const MARGIN: usize = 3;
-/// Least and greatest share of the grid's cells that all holes of a mask take.
-pub const SHARE: (f32, f32) = (0.04, 0.5);
-/// Share of holes so large that little cloth is left around them, as where a region cannot grow further.
+/// Fewest cells between a hole and the grid's border.
+pub(super) const MARGIN: usize = 3;
+/// Smallest share of the grid's cells in the holes of a mask.
+const LEAST_SHARE: f32 = 0.04;
+/// Largest share of the grid's cells in the holes of a mask.
+const GREATEST_SHARE: f32 = 0.5;
+/// Share of large holes, which leave little cloth around them, as where a region cannot grow further.
 const LARGE: f64 = 0.15;
 
-/// The kinds of holes.
+/// The shapes of holes on the grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Shape {
+pub enum MaskShape {
     /// A disk.
     Circle,
     /// A ring around an island of cloth.
     Ring,
     /// Ragged: grown by invasion of a random field.
     Percolation,
-    /// Long and thin, with a bent course and a ragged edge.
+    /// Long and thin, along a bent line, with a ragged edge.
     Tear,
     /// Star-shaped with a wavy edge.
     Blob,
 }
 
-/// All shapes, each with its share among drawn holes.
-pub const SHAPES: [(Shape, f32); 5] = [
-    (Shape::Circle, 0.18),
-    (Shape::Ring, 0.07),
-    (Shape::Percolation, 0.27),
-    (Shape::Tear, 0.20),
-    (Shape::Blob, 0.28),
+/// All shapes, each with its share of all holes.
+pub const SHAPES: [(MaskShape, f32); 5] = [
+    (MaskShape::Circle, 0.18),
+    (MaskShape::Ring, 0.07),
+    (MaskShape::Percolation, 0.27),
+    (MaskShape::Tear, 0.20),
+    (MaskShape::Blob, 0.28),
 ];
 
-/// A point of the grid in cells.
-type Place = [f32; 2];
-
-/// Draws a mask of one hole, sometimes two.
-pub fn draw(rng: &mut impl Rng) -> Vec<bool> {
-    draw_kind(rng).1
-}
-
-/// [`draw`], and the shape of the first hole.
-pub fn draw_kind(rng: &mut impl Rng) -> (Shape, Vec<bool>) {
+/// Draws a mask of one hole, sometimes two, and the shape of the first hole.
+pub fn draw(rng: &mut impl Rng) -> (MaskShape, Vec<bool>) {
     let mut at = rng.random_range(0.0..1.0f32);
-    let mut shape = Shape::Blob;
+    let mut shape = MaskShape::Blob;
     for (candidate, share) in SHAPES {
         if at < share {
             shape = candidate;
@@ -68,7 +62,7 @@ pub fn draw_kind(rng: &mut impl Rng) -> (Shape, Vec<bool>) {
 }
 
 /// Draws a mask of one hole of the given shape, somewhere near the middle.
-pub fn draw_shape(shape: Shape, rng: &mut impl Rng) -> Vec<bool> {
+pub fn draw_shape(shape: MaskShape, rng: &mut impl Rng) -> Vec<bool> {
     loop {
         let extent = SIDE as f32
             * if rng.random_bool(LARGE) {
@@ -78,24 +72,24 @@ pub fn draw_shape(shape: Shape, rng: &mut impl Rng) -> Vec<bool> {
             };
         let middle = [place(rng), place(rng)];
         let mask = match shape {
-            Shape::Circle => disk(middle, 0.0, 0.5 * extent),
-            Shape::Ring => disk(
+            MaskShape::Circle => disk(middle, 0.0, 0.5 * extent),
+            MaskShape::Ring => disk(
                 middle,
                 0.5 * extent * rng.random_range(0.25..0.6),
                 0.5 * extent,
             ),
-            Shape::Percolation => percolation(middle, 0.5 * extent, rng),
-            Shape::Tear => tear(middle, extent * 1.2, rng),
-            Shape::Blob => blob(middle, 0.45 * extent, rng),
+            MaskShape::Percolation => percolation(middle, 0.5 * extent, rng),
+            MaskShape::Tear => tear(middle, extent * 1.2, rng),
+            MaskShape::Blob => blob(middle, 0.45 * extent, rng),
         };
         let mask = clear_border(mask);
-        let mask = if shape == Shape::Ring {
+        let mask = if shape == MaskShape::Ring {
             mask
         } else {
             fill_islands(largest_piece(mask))
         };
         let share = mask.iter().filter(|&&m| m).count() as f32 / CELLS as f32;
-        if share >= SHARE.0 && share <= SHARE.1 {
+        if (LEAST_SHARE..=GREATEST_SHARE).contains(&share) {
             return mask;
         }
     }
@@ -105,7 +99,7 @@ fn place(rng: &mut impl Rng) -> f32 {
     SIDE as f32 * rng.random_range(0.38..0.62)
 }
 
-/// Adds a second, smaller hole where there is room for it; otherwise leaves the mask as it is.
+/// Adds a second, smaller hole where there is room for it.
 fn beside(first: Vec<bool>, rng: &mut impl Rng) -> Vec<bool> {
     let away = distance(&first);
     for _ in 0..20 {
@@ -115,18 +109,19 @@ fn beside(first: Vec<bool>, rng: &mut impl Rng) -> Vec<bool> {
         let clear = second.iter().zip(&away).all(|(&m, &d)| !m || d > 4.0);
         let both: Vec<bool> = first.iter().zip(&second).map(|(a, b)| a | b).collect();
         let share = both.iter().filter(|&&m| m).count() as f32 / CELLS as f32;
-        if clear && second.contains(&true) && share <= SHARE.1 {
+        if clear && second.contains(&true) && share <= GREATEST_SHARE {
             return both;
         }
     }
     first
 }
 
-fn cells() -> impl Iterator<Item = Place> {
+/// The centres of all cells, in cells.
+fn cells() -> impl Iterator<Item = [f32; 2]> {
     (0..CELLS).map(|k| [(k % SIDE) as f32 + 0.5, (k / SIDE) as f32 + 0.5])
 }
 
-fn disk(middle: Place, inner: f32, outer: f32) -> Vec<bool> {
+fn disk(middle: [f32; 2], inner: f32, outer: f32) -> Vec<bool> {
     cells()
         .map(|[x, y]| {
             let r = (x - middle[0]).hypot(y - middle[1]);
@@ -136,7 +131,7 @@ fn disk(middle: Place, inner: f32, outer: f32) -> Vec<bool> {
 }
 
 /// Star-shaped: the radius is a random Fourier series of the angle, rough or smooth.
-fn blob(middle: Place, radius: f32, rng: &mut impl Rng) -> Vec<bool> {
+fn blob(middle: [f32; 2], radius: f32, rng: &mut impl Rng) -> Vec<bool> {
     let rough = rng.random_range(0.1..0.5);
     let fall = rng.random_range(0.8..1.5f32);
     let waves: Vec<[f32; 2]> = (1..10)
@@ -162,13 +157,13 @@ fn blob(middle: Place, radius: f32, rng: &mut impl Rng) -> Vec<bool> {
 }
 
 /// A bent line of varying width, `length` cells long before clipping.
-fn tear(middle: Place, length: f32, rng: &mut impl Rng) -> Vec<bool> {
+fn tear(middle: [f32; 2], length: f32, rng: &mut impl Rng) -> Vec<bool> {
     let width = rng.random_range(2.5..7.0);
     let ragged = rng.random_range(0.0..0.35);
     let mut heading = rng.random_range(0.0..TAU);
     let bend = rng.random_range(-1.2..1.2) / length;
     let (steps, phase) = (length.ceil() as usize * 2, rng.random_range(0.0..TAU));
-    let mut course: Vec<(Place, f32)> = Vec::with_capacity(steps);
+    let mut course: Vec<([f32; 2], f32)> = Vec::with_capacity(steps);
     let mut at = [0.0f32, 0.0];
     for n in 0..steps {
         let t = (n as f32 + 0.5) / steps as f32;
@@ -192,13 +187,13 @@ fn tear(middle: Place, length: f32, rng: &mut impl Rng) -> Vec<bool> {
 }
 
 /// Invasion percolation: from the middle outwards, always the neighbour with the least of a random field that rises with the radius.
-fn percolation(middle: Place, radius: f32, rng: &mut impl Rng) -> Vec<bool> {
+fn percolation(middle: [f32; 2], radius: f32, rng: &mut impl Rng) -> Vec<bool> {
     let mut field: Vec<f32> = (0..CELLS).map(|_| rng.random_range(0.0..1.0)).collect();
     let rounds = rng.random_range(0..4);
     for _ in 0..rounds {
         field = blurred(&field);
     }
-    // blurring narrows the field; widen it again so that its roughness keeps its weight against the radius
+    // Blurring narrows the range of the field. It is widened again, so that its roughness keeps its weight against the radius.
     let weight = rng.random_range(0.5..1.6) * [1.0, 3.0, 4.5, 6.0][rounds];
     let target = (rng.random_range(0.45..0.9) * PI * radius * radius) as usize;
     let value = |k: usize| {
@@ -211,10 +206,13 @@ fn percolation(middle: Place, radius: f32, rng: &mut impl Rng) -> Vec<bool> {
     let start = middle[1] as usize * SIDE + middle[0] as usize;
     let mut mask = vec![false; CELLS];
     let mut seen = vec![false; CELLS];
-    let mut front = BinaryHeap::from([Front(value(start), start)]);
+    let mut front = BinaryHeap::from([FrontierCell {
+        value: value(start),
+        cell: start,
+    }]);
     seen[start] = true;
     let mut taken = 0;
-    while let Some(Front(_, k)) = front.pop() {
+    while let Some(FrontierCell { cell: k, .. }) = front.pop() {
         mask[k] = true;
         taken += 1;
         if taken >= target {
@@ -223,24 +221,33 @@ fn percolation(middle: Place, radius: f32, rng: &mut impl Rng) -> Vec<bool> {
         for n in around(k) {
             if !seen[n] {
                 seen[n] = true;
-                front.push(Front(value(n), n));
+                front.push(FrontierCell {
+                    value: value(n),
+                    cell: n,
+                });
             }
         }
     }
     mask
 }
 
-/// A cell waiting to be invaded; the least value comes first.
+/// A cell that may be invaded next; the cell of the smallest value comes first.
 #[derive(PartialEq)]
-struct Front(f32, usize);
+struct FrontierCell {
+    value: f32,
+    cell: usize,
+}
 
-impl Eq for Front {}
-impl Ord for Front {
+impl Eq for FrontierCell {}
+impl Ord for FrontierCell {
     fn cmp(&self, other: &Self) -> Ordering {
-        other.0.total_cmp(&self.0).then(other.1.cmp(&self.1))
+        other
+            .value
+            .total_cmp(&self.value)
+            .then(other.cell.cmp(&self.cell))
     }
 }
-impl PartialOrd for Front {
+impl PartialOrd for FrontierCell {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
@@ -273,12 +280,17 @@ fn clear_border(mut mask: Vec<bool>) -> Vec<bool> {
     mask
 }
 
-/// All 4-connected pieces of the cells with the given flag, each as a list of cells.
-pub fn pieces(mask: &[bool], flag: bool) -> Vec<Vec<usize>> {
+/// The cells that are not in a mask.
+fn inverted(mask: &[bool]) -> Vec<bool> {
+    mask.iter().map(|m| !m).collect()
+}
+
+/// All 4-connected pieces of a mask, each as a list of cells.
+fn pieces(mask: &[bool]) -> Vec<Vec<usize>> {
     let mut seen = vec![false; CELLS];
     let mut found = Vec::new();
     for start in 0..CELLS {
-        if mask[start] != flag || seen[start] {
+        if !mask[start] || seen[start] {
             continue;
         }
         seen[start] = true;
@@ -286,7 +298,7 @@ pub fn pieces(mask: &[bool], flag: bool) -> Vec<Vec<usize>> {
         let mut next = 0;
         while next < piece.len() {
             for n in around(piece[next]) {
-                if mask[n] == flag && !seen[n] {
+                if mask[n] && !seen[n] {
                     seen[n] = true;
                     piece.push(n);
                 }
@@ -300,7 +312,7 @@ pub fn pieces(mask: &[bool], flag: bool) -> Vec<Vec<usize>> {
 
 fn largest_piece(mask: Vec<bool>) -> Vec<bool> {
     let mut kept = vec![false; CELLS];
-    let largest = pieces(&mask, true)
+    let largest = pieces(&mask)
         .into_iter()
         .max_by_key(Vec::len)
         .unwrap_or_default();
@@ -310,9 +322,9 @@ fn largest_piece(mask: Vec<bool>) -> Vec<bool> {
     kept
 }
 
-/// Cloth cut off inside a hole belongs to the hole.
+/// The mask with the islands of cloth inside a hole added to the hole.
 fn fill_islands(mut mask: Vec<bool>) -> Vec<bool> {
-    for piece in pieces(&mask, false) {
+    for piece in pieces(&inverted(&mask)) {
         if !piece.contains(&0) {
             for k in piece {
                 mask[k] = true;
@@ -322,8 +334,8 @@ fn fill_islands(mut mask: Vec<bool>) -> Vec<bool> {
     mask
 }
 
-/// Distance of every cell's centre from the nearest cell of the mask, in cells; exact, by columns and then rows.
-pub fn distance(mask: &[bool]) -> Vec<f32> {
+/// Exact distance of every cell's centre from the nearest cell of the mask, in cells, computed by columns and then by rows.
+pub(super) fn distance(mask: &[bool]) -> Vec<f32> {
     const FAR: f32 = 4.0 * SIDE as f32;
     let mut column = vec![FAR; CELLS];
     for i in 0..SIDE {
@@ -364,18 +376,18 @@ mod tests {
             let shape = SHAPES[kind].0;
             let mask = draw_shape(shape, &mut ChaCha8Rng::seed_from_u64(seed));
             let share = mask.iter().filter(|&&m| m).count() as f32 / CELLS as f32;
-            prop_assert!((SHARE.0..=SHARE.1).contains(&share), "{share}");
+            prop_assert!((LEAST_SHARE..=GREATEST_SHARE).contains(&share), "{share}");
             let inside = MARGIN..SIDE - MARGIN;
             for (k, _) in mask.iter().enumerate().filter(|(_, m)| **m) {
                 prop_assert!(inside.contains(&(k % SIDE)) && inside.contains(&(k / SIDE)));
             }
-            prop_assert_eq!(pieces(&mask, true).len(), 1);
-            prop_assert_eq!(pieces(&mask, false).len(), if shape == Shape::Ring { 2 } else { 1 });
+            prop_assert_eq!(pieces(&mask).len(), 1);
+            prop_assert_eq!(pieces(&inverted(&mask)).len(), if shape == MaskShape::Ring { 2 } else { 1 });
         }
 
         #[test]
         fn distance_is_what_a_search_over_all_cells_finds(seed: u64, cell in 0..CELLS) {
-            let mask = draw(&mut ChaCha8Rng::seed_from_u64(seed));
+            let mask = draw(&mut ChaCha8Rng::seed_from_u64(seed)).1;
             let apart = |k: usize| ((k % SIDE) as f32 - (cell % SIDE) as f32).hypot((k / SIDE) as f32 - (cell / SIDE) as f32);
             let nearest = (0..CELLS).filter(|&k| mask[k]).map(apart).fold(f32::MAX, f32::min);
             prop_assert!((distance(&mask)[cell] - nearest).abs() < 1e-4);

@@ -1,15 +1,23 @@
-//! The ScarfFolds generator: cloth simulation, self-intersection filter, sheets on disk, hole masks and training samples.
-//! It makes what the network learns from; everything is drawn from an explicit seed.
-//! No network, no loss, no training loop: those live in `net` and `train`.
+//! The ScarfFolds generator: cloth simulation, files of sheets, hole masks, training samples and scans with holes.
+//!
+//! Everything is drawn from an explicit seed. The order of use: [`sheets::make`] simulates one [`sheets::SimulatedSheet`] at rest
+//! (a [`scene`] moved by an XPBD solver), [`samples::Sampler`] cuts training samples from sheets, and [`holed_scan::holed_scan`] meshes a
+//! sheet like a scan. This module knows no network, no loss and no training loop.
 
-pub mod cloth;
-pub mod collide;
+mod contacts;
+pub mod error;
 pub mod export;
+pub mod fabric;
 mod field;
 mod files;
+pub mod holed_scan;
+pub mod lattice;
+pub mod manifest;
 pub mod masks;
+pub mod obstacle;
 pub mod samples;
-pub mod scanned;
 pub mod scene;
+mod sheet;
 pub mod sheets;
+mod solver;
 mod spline;

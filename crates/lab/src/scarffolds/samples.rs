@@ -1,18 +1,19 @@
-//! Training samples: a sheet, a square of it, a hole in the square, in the network's units.
+//! Training samples: a square of a sheet with a hole, in the network's units.
 //!
-//! A sample looks like what `flatten` and `Grid` hand to the network: the hole takes a third to two thirds of the grid, cloth ends where
-//! the sheet ends or at some distance from the hole, the mean of the known cells is 0 and the mean spacing of known neighbours is 1/64.
+//! A sample has the properties of the grids that the service gives to the network: the hole takes a third to two thirds of the grid's side,
+//! the cloth ends at the border of the sheet or at some distance from the hole, the mean of the known cells is 0 and the mean spacing of
+//! known neighbours is 1/64.
 
-use super::masks::{self, Shape};
-use super::sheets::Sheet;
-use super::spline::Spline;
+use super::masks::{self, MaskShape};
+use super::sheet::SimulatedSheet;
+use super::spline::SheetSpline;
 use darn_geometry::grid::{CELLS, SIDE};
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 use rand::Rng;
 
 /// One training sample; every list is `CELLS` long, in the grid's order.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sample {
+pub struct TrainingSample {
     /// Where the cloth is; zero where it is not `valid`. Vertex noise, if any, is in the known cells only.
     pub truth: Vec<[f32; 3]>,
     /// The cell's centre lies on the sheet.
@@ -23,60 +24,52 @@ pub struct Sample {
     pub hole: Vec<bool>,
 }
 
-/// How samples are turned in space.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Turning {
-    /// Any rotation: the network knows no direction.
+/// How samples are rotated in space.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SampleRotation {
+    /// By any rotation: the network knows no direction.
     Any,
-    /// About +z only: up stays up.
+    /// About +z only: +z stays up.
     Upright,
-}
-
-impl Turning {
-    /// How samples are turned when up is to stay up, or not.
-    pub fn keeping_up(upright: bool) -> Self {
-        match upright {
-            true => Self::Upright,
-            false => Self::Any,
-        }
-    }
 }
 
 /// Draws samples from sheets.
 #[derive(Debug, Clone)]
 pub struct Sampler {
-    splines: Vec<Spline>,
-    /// By sheet: see [`Sheet::roughness`].
+    splines: Vec<SheetSpline>,
+    /// By sheet: see [`SimulatedSheet::roughness`].
     roughness: Vec<f32>,
-    turning: Turning,
+    rotation: SampleRotation,
     /// Sheets drawn for a sample, of which the roughest is taken.
     candidates: usize,
 }
 
-/// Share of samples whose region ends at a distance from the hole; the others fill the grid or end at the sheet's border only.
+/// Share of samples whose region ends at a distance from the hole. The others fill the grid, or end at the border of the sheet only.
 const BANDED: f64 = 0.75;
-/// Share of samples with vertex noise, and its greatest standard deviation in cells.
-const NOISY: (f64, f32) = (0.15, 0.15);
-/// Cells of cloth around a hole that must lie on the sheet: a hole never runs into the sheet's border.
+/// Share of samples with vertex noise.
+const NOISY: f64 = 0.15;
+/// Largest standard deviation of that noise, in cells.
+const NOISE_CELLS: f32 = 0.15;
+/// Cells of cloth around a hole that must lie on the sheet: a hole never touches the border of the sheet.
 const RIM: f32 = 2.5;
 
 impl Sampler {
     /// A sampler over `sheets`.
     ///
     /// # Panics
-    /// When there are no sheets, or one of them has not `VERTICES` positions.
-    pub fn new(sheets: &[Sheet], turning: Turning) -> Self {
+    /// When there are no sheets, or a sheet does not have [`VERTICES`](super::lattice::VERTICES) positions.
+    pub fn new(sheets: &[SimulatedSheet], rotation: SampleRotation) -> Self {
         assert!(!sheets.is_empty(), "a sampler needs sheets");
         Self {
-            splines: sheets.iter().map(Spline::new).collect(),
-            roughness: sheets.iter().map(Sheet::roughness).collect(),
-            turning,
+            splines: sheets.iter().map(SheetSpline::new).collect(),
+            roughness: sheets.iter().map(SimulatedSheet::roughness).collect(),
+            rotation,
             candidates: 1,
         }
     }
 
-    /// The same, with every sample from the roughest of so many sheets: most sheets of a folder are gentle, and little is learned there.
+    /// A sampler that takes every sample from the roughest of `candidates` random sheets: most sheets of a folder are smooth, and little is
+    /// learned from them.
     pub fn roughest_of(self, candidates: usize) -> Self {
         Self {
             candidates: candidates.max(1),
@@ -84,19 +77,19 @@ impl Sampler {
         }
     }
 
-    /// How many sheets there are.
+    /// Number of sheets.
     pub fn sheets(&self) -> usize {
         self.splines.len()
     }
 
-    /// Draws `count` samples from any sheets, all with the same cells valid, known and missing: what depends on those alone, as the plate's
-    /// factor, needs to be made once.
-    pub fn alike(&self, count: usize, rng: &mut impl Rng) -> Vec<Sample> {
+    /// Draws `count` samples from random sheets, all with the same valid, known and hole cells: what depends on these cells only, such as
+    /// the factor of the plate, is computed once for all.
+    pub fn alike(&self, count: usize, rng: &mut impl Rng) -> Vec<TrainingSample> {
         let sheets: Vec<usize> = (0..count).map(|_| self.roughest(rng)).collect();
-        let cut = Cut::draw(rng);
+        let square = HoledSquare::draw(rng);
         let samples = sheets.into_iter().map(|sheet| {
-            let mut sample = self.taken(sheet, &cut, rng);
-            if rng.random_bool(NOISY.0) {
+            let mut sample = self.cut_from(sheet, &square, rng);
+            if rng.random_bool(NOISY) {
                 add_noise(&mut sample.truth, &sample.known, rng);
             }
             sample
@@ -104,7 +97,7 @@ impl Sampler {
         samples.collect()
     }
 
-    /// The roughest of some sheets.
+    /// The roughest of [`Self::roughest_of`] random sheets.
     fn roughest(&self, rng: &mut impl Rng) -> usize {
         let drawn = (0..self.candidates).map(|_| rng.random_range(0..self.splines.len()));
         drawn
@@ -112,50 +105,50 @@ impl Sampler {
             .unwrap_or(0)
     }
 
-    /// Draws a sample from sheet number `sheet` without noise, and the shape of its hole: for measuring sets in which every sheet has its turn.
-    pub fn clean_sample_of(&self, sheet: usize, rng: &mut impl Rng) -> (Shape, Sample) {
-        let cut = Cut::draw(rng);
-        let sample = self.taken(sheet, &cut, rng);
-        (cut.shape, sample)
+    /// Draws a sample without noise from sheet number `sheet`, and the shape of its hole.
+    pub fn clean_sample_of(&self, sheet: usize, rng: &mut impl Rng) -> (MaskShape, TrainingSample) {
+        let square = HoledSquare::draw(rng);
+        let sample = self.cut_from(sheet, &square, rng);
+        (square.shape, sample)
     }
 
-    /// What a cut takes from a sheet.
-    fn taken(&self, sheet: usize, cut: &Cut, rng: &mut impl Rng) -> Sample {
+    /// The sample that a square cuts from a sheet.
+    fn cut_from(&self, sheet: usize, square: &HoledSquare, rng: &mut impl Rng) -> TrainingSample {
         let spline = &self.splines[sheet];
-        let cells = cut.places.iter().zip(&cut.valid);
+        let cells = square.places.iter().zip(&square.valid);
         let positions: Vec<Vector3<f32>> = cells
             .map(|(place, valid)| match valid {
                 true => spline.at(*place),
                 false => Vector3::zeros(),
             })
             .collect();
-        let turn = turn(self.turning, rng);
-        Sample {
-            truth: normalised(&positions, &cut.valid, &cut.known, &turn),
-            valid: cut.valid.clone(),
-            known: cut.known.clone(),
-            hole: cut.hole.clone(),
+        let rotation = draw_rotation(self.rotation, rng);
+        TrainingSample {
+            truth: normalised(&positions, &square.valid, &square.known, &rotation),
+            valid: square.valid.clone(),
+            known: square.known.clone(),
+            hole: square.hole.clone(),
         }
     }
 }
 
-/// A square of a sheet with a hole in it, whatever the sheet; lists are `CELLS` long.
-struct Cut {
-    shape: Shape,
-    /// Where cells lie on the sheet.
+/// A square with a hole, for any sheet; lists are `CELLS` long.
+struct HoledSquare {
+    shape: MaskShape,
+    /// Position of each cell on the sheet, in the unit square.
     places: Vec<[f32; 2]>,
     valid: Vec<bool>,
     known: Vec<bool>,
     hole: Vec<bool>,
 }
 
-impl Cut {
+impl HoledSquare {
     fn draw(rng: &mut impl Rng) -> Self {
         let banded = rng.random_bool(BANDED);
-        let (shape, hole) = masks::draw_kind(rng);
+        let (shape, hole) = masks::draw(rng);
         let hole = if banded { centred(&hole, rng) } else { hole };
         let away = masks::distance(&hole);
-        let square = Square::around(&away, rng);
+        let square = SheetSquare::around(&away, rng);
         let reach = if banded {
             region_edge(&hole, rng)
         } else {
@@ -176,15 +169,15 @@ impl Cut {
     }
 }
 
-/// The grid's square on the sheet: place = middle + across · (i, j), a similarity, sometimes mirrored.
-struct Square {
+/// The grid's square on the sheet: cell (i, j) is at middle + i · along_u + j · along_v, a similarity, sometimes mirrored.
+struct SheetSquare {
     middle: [f32; 2],
     along_u: [f32; 2],
     along_v: [f32; 2],
 }
 
-impl Square {
-    /// A random square such that the hole, and `RIM` cells around it, lie on the sheet.
+impl SheetSquare {
+    /// A random square with the hole and `RIM` cells around it on the sheet; `away` holds the distance of each cell from the hole.
     fn around(away: &[f32], rng: &mut impl Rng) -> Self {
         let guarded: Vec<usize> = (0..CELLS).filter(|&k| away[k] <= RIM).collect();
         let mut side = rng.random_range(0.35..1.3f32);
@@ -222,20 +215,41 @@ fn on_sheet([u, v]: [f32; 2]) -> bool {
     (0.0..=1.0).contains(&u) && (0.0..=1.0).contains(&v)
 }
 
-/// First and last column, and first and last row, of the mask; `[64, 0]` twice when it is empty.
-pub fn bounds(mask: &[bool]) -> [[usize; 2]; 2] {
-    let mut found = [[SIDE, 0]; 2];
-    for k in (0..CELLS).filter(|&k| mask[k]) {
-        for (range, at) in found.iter_mut().zip([k % SIDE, k / SIDE]) {
-            *range = [range[0].min(at), range[1].max(at)];
-        }
-    }
-    found
+/// The first and the last column or row of a mask.
+#[derive(Debug, Clone, Copy)]
+pub struct CellSpan {
+    /// The first.
+    pub first: usize,
+    /// The last.
+    pub last: usize,
 }
 
-/// The mask moved so that its holes stand in the middle, give or take two cells: a region grows alike on all sides.
+impl CellSpan {
+    /// Number of cells from the first to the last.
+    pub fn length(self) -> usize {
+        (self.last + 1).saturating_sub(self.first)
+    }
+}
+
+/// Columns and rows of a mask, in this order; a mask without cells gives spans from 64 to 0.
+pub fn spans(mask: &[bool]) -> [CellSpan; 2] {
+    let nothing = CellSpan {
+        first: SIDE,
+        last: 0,
+    };
+    let mut spans = [nothing; 2];
+    for k in (0..CELLS).filter(|&k| mask[k]) {
+        for (span, at) in spans.iter_mut().zip([k % SIDE, k / SIDE]) {
+            span.first = span.first.min(at);
+            span.last = span.last.max(at);
+        }
+    }
+    spans
+}
+
+/// The mask moved so that its holes are in the middle, up to two cells off: a region grows equally far on all sides.
 fn centred(mask: &[bool], rng: &mut impl Rng) -> Vec<bool> {
-    let shift = bounds(mask).map(|[first, last]| {
+    let shift = spans(mask).map(|CellSpan { first, last }| {
         let ideal = (SIDE as i32 - 1 - first as i32 - last as i32) / 2 + rng.random_range(-2..=2);
         let room = [
             masks::MARGIN as i32 - first as i32,
@@ -251,10 +265,11 @@ fn centred(mask: &[bool], rng: &mut impl Rng) -> Vec<bool> {
     moved
 }
 
-/// How far from the hole the region reaches in each cell's direction: so far that the grid is its tightest square, with an uneven edge.
+/// Distance from the hole, in cells, up to which the region reaches at each cell: such that the grid is the smallest square around the
+/// region, with an uneven edge.
 fn region_edge(hole: &[bool], rng: &mut impl Rng) -> Vec<f32> {
-    let extent = bounds(hole)
-        .map(|[first, last]| last + 1 - first)
+    let extent = spans(hole)
+        .map(CellSpan::length)
         .into_iter()
         .max()
         .unwrap_or(SIDE);
@@ -286,10 +301,10 @@ fn region_edge(hole: &[bool], rng: &mut impl Rng) -> Vec<f32> {
         .collect()
 }
 
-/// A rotation drawn evenly from all, or about +z.
-fn turn(turning: Turning, rng: &mut impl Rng) -> Rotation3<f32> {
-    match turning {
-        Turning::Any => loop {
+/// A random rotation, uniform over all rotations or over those about +z.
+fn draw_rotation(rotation: SampleRotation, rng: &mut impl Rng) -> Rotation3<f32> {
+    match rotation {
+        SampleRotation::Any => loop {
             let q = Quaternion::from(nalgebra::Vector4::from_fn(|_, _| {
                 rng.random_range(-1.0..1.0f32)
             }));
@@ -297,19 +312,20 @@ fn turn(turning: Turning, rng: &mut impl Rng) -> Rotation3<f32> {
                 return UnitQuaternion::from_quaternion(q).to_rotation_matrix();
             }
         },
-        Turning::Upright => Rotation3::from_axis_angle(
+        SampleRotation::Upright => Rotation3::from_axis_angle(
             &Vector3::z_axis(),
             rng.random_range(0.0..std::f32::consts::TAU),
         ),
     }
 }
 
-/// Known cells to mean 0 and mean spacing 1/64, as the service's grids are; then turned. Zero where not valid.
+/// Positions moved and scaled so that known cells have mean 0 and mean spacing 1/64, as the service's grids have, then rotated; zero where
+/// not valid.
 fn normalised(
     positions: &[Vector3<f32>],
     valid: &[bool],
     known: &[bool],
-    turn: &Rotation3<f32>,
+    rotation: &Rotation3<f32>,
 ) -> Vec<[f32; 3]> {
     let mut mean = Vector3::<f64>::zeros();
     let (mut spacing, mut pairs, mut count) = (0.0f64, 0usize, 0usize);
@@ -331,7 +347,7 @@ fn normalised(
     };
     let place = |k: usize| {
         if valid[k] {
-            (turn * (positions[k] - mean) * scale).into()
+            (rotation * (positions[k] - mean) * scale).into()
         } else {
             [0.0; 3]
         }
@@ -339,13 +355,13 @@ fn normalised(
     (0..CELLS).map(place).collect()
 }
 
-/// Noise of one random strength on the known cells: three uniform numbers added are near enough to a Gaussian.
+/// Adds noise of one random strength to the known cells. The sum of three uniform numbers stands for a Gaussian.
 fn add_noise(truth: &mut [[f32; 3]], known: &[bool], rng: &mut impl Rng) {
-    let strength = rng.random_range(0.0..NOISY.1) / SIDE as f32;
+    let strength = rng.random_range(0.0..NOISE_CELLS) / SIDE as f32;
     for (p, _) in truth.iter_mut().zip(known).filter(|(_, known)| **known) {
         for x in p {
             let bell: f32 = (0..3).map(|_| rng.random_range(-1.0..1.0f32)).sum();
-            *x += strength * bell; // the variance of the sum is 3 · 1/3 = 1
+            *x += strength * bell; // The variance of the sum is 3 · 1/3 = 1.
         }
     }
 }

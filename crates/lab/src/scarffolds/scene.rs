@@ -1,10 +1,12 @@
-//! Random scenes: what a sheet is made of, where it is carried, what it falls on; and one sheet's simulation from start to rest.
+//! Random scenes: the material of a sheet, where its pinned vertices are moved, what it falls on; and its simulation from start to rest.
 //!
-//! Targets of pins are never further apart than the flat sheet allows; between the flat start and the targets, pins go along
-//! straight lines, along which distances are convex, so the cloth allows every moment of the way.
+//! The targets of pinned vertices are never further apart than the flat sheet allows. Pins move along straight lines from the flat start to
+//! their targets. Distances are convex along these lines, so the cloth allows every moment of the motion.
 
-use super::cloth::{Cloth, Fabric, Forces, GRAVITY, Pin, Point, SIDE, SPACING, VERTICES};
-use super::collide::Collider;
+use super::fabric::FabricParameters;
+use super::lattice::{SIDE, SPACING, VERTICES, Vec3f};
+use super::obstacle::Obstacle;
+use super::solver::{ClothSolver, GRAVITY, PinnedVertex, StepConditions};
 use nalgebra::{Rotation3, Unit};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -12,67 +14,67 @@ use rand_chacha::ChaCha8Rng;
 /// How the sheet is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Kind {
-    /// All four corners carried to random targets: the paper's scene.
+pub enum SceneKind {
+    /// All four corners moved to random targets: the paper's scene.
     FourCorners,
-    /// Three corners carried, one free.
+    /// Three corners moved, one free.
     ThreeCorners,
-    /// Two corners carried, two free.
+    /// Two corners moved, two free.
     TwoCorners,
-    /// One edge held at several points drawn together: a curtain.
+    /// A curtain: one edge held at several points that move towards each other.
     Curtain,
-    /// Two opposite edges held at their ends and middles, one turned against the other about the line between them.
+    /// Two opposite edges held at their ends and middles, and turned against each other about the line between them.
     Twisted,
-    /// One to three vertices anywhere carried.
+    /// One to three random vertices moved.
     Points,
     /// Fallen on a sphere, a bar, a block or the floor.
     Draped,
 }
 
-/// Parameters of one sheet, as the manifest keeps them.
+/// Parameters of one sheet, as written into the manifest.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Scene {
     /// How the sheet is held.
-    pub kind: Kind,
-    /// What it is made of.
-    pub fabric: Fabric,
-    /// Held vertices.
+    pub kind: SceneKind,
+    /// Its material.
+    pub fabric: FabricParameters,
+    /// Indices of the pinned vertices.
     pub pins: Vec<usize>,
     /// Where they end, metres; one for each pin.
     pub targets: Vec<[f32; 3]>,
     /// What it falls on.
-    pub obstacles: Vec<Collider>,
-    /// Seconds of the carrying.
+    pub obstacles: Vec<Obstacle>,
+    /// How long the pins move, seconds.
     pub carry: f32,
-    /// Velocity of the gusts while it is carried, m/s.
+    /// Velocity of the gusts while the pins move, m/s.
     pub wind: [f32; 3],
-    /// Damping while it is carried, 1/s.
+    /// Damping while the pins move, 1/s.
     pub damping: f32,
-    /// Height of the unevenness it starts with, metres.
+    /// Height of the unevenness of the start, metres.
     pub unevenness: f32,
 }
 
-/// Seconds of a step while the sheet moves.
+/// Length of a step while the sheet moves, seconds.
 const STEP: f32 = 1.0e-3;
-/// Seconds after the carrying in which the sheet may come to rest.
+/// Longest time after the motion of the pins for the sheet to come to rest, seconds.
 const SETTLE: f32 = 2.5;
-/// A sheet slower than this is at rest, m/s.
+/// A sheet below this speed is at rest, m/s.
 const REST: f32 = 0.008;
 
 impl Scene {
     /// Draws a scene.
-    pub fn draw(rng: &mut ChaCha8Rng) -> Self {
+    pub(super) fn draw(rng: &mut ChaCha8Rng) -> Self {
         let kind = match rng.random_range(0..100) {
-            0..54 => Kind::FourCorners,
-            54..64 => Kind::ThreeCorners,
-            64..72 => Kind::TwoCorners,
-            72..79 => Kind::Curtain,
-            79..85 => Kind::Twisted,
-            85..89 => Kind::Points,
-            _ => Kind::Draped,
+            0..54 => SceneKind::FourCorners,
+            54..64 => SceneKind::ThreeCorners,
+            64..72 => SceneKind::TwoCorners,
+            72..79 => SceneKind::Curtain,
+            79..85 => SceneKind::Twisted,
+            85..89 => SceneKind::Points,
+            _ => SceneKind::Draped,
         };
         let fold = log_uniform(rng, 0.003, 0.028);
-        let fabric = Fabric {
+        let fabric = FabricParameters {
             bend: GRAVITY * fold * fold * fold,
             shear: log_uniform(rng, 1.0e3, 2.0e5),
             thickness: SPACING * rng.random_range(0.74..0.9),
@@ -81,8 +83,8 @@ impl Scene {
         };
         let pins = draw_pins(kind, rng);
         let targets = match kind {
-            Kind::Curtain => gathered(&pins, rng),
-            Kind::Twisted => twisted(&pins, rng),
+            SceneKind::Curtain => gathered(&pins, rng),
+            SceneKind::Twisted => twisted(&pins, rng),
             _ => scattered(&pins, rng),
         };
         let gust = rng.random_range(0.0f32..1.0).powi(2) * 3.0;
@@ -91,7 +93,7 @@ impl Scene {
             fabric,
             pins,
             targets: targets.into_iter().map(Into::into).collect(),
-            obstacles: if kind == Kind::Draped {
+            obstacles: if kind == SceneKind::Draped {
                 draw_obstacles(rng)
             } else {
                 Vec::new()
@@ -103,29 +105,29 @@ impl Scene {
         }
     }
 
-    /// Lets the sheet come to rest; `VERTICES` positions, metres. `rng` draws the unevenness of the start.
-    pub fn simulate(&self, rng: &mut ChaCha8Rng) -> Vec<Point> {
+    /// Simulates until the sheet is at rest: `VERTICES` positions, metres. `rng` draws the unevenness of the start.
+    pub(super) fn simulate(&self, rng: &mut ChaCha8Rng) -> Vec<Vec3f> {
         let start = uneven(self.unevenness, rng);
-        let pins: Vec<Pin> = self
+        let pins: Vec<PinnedVertex> = self
             .pins
             .iter()
-            .map(|&vertex| Pin {
+            .map(|&vertex| PinnedVertex {
                 vertex,
                 at: start[vertex],
             })
             .collect();
-        let from: Vec<Point> = pins.iter().map(|pin| pin.at).collect();
-        let mut cloth = Cloth::new(&start, pins, self.fabric);
+        let from: Vec<Vec3f> = pins.iter().map(|pin| pin.at).collect();
+        let mut cloth = ClothSolver::new(&start, pins, self.fabric);
         let carry_steps = (self.carry / STEP) as usize;
         for step in 0..carry_steps {
             let t = (step + 1) as f32 / carry_steps as f32;
             for (k, (a, b)) in from.iter().zip(&self.targets).enumerate() {
-                cloth.carry(k, a + (Point::from(*b) - a) * t);
+                cloth.move_pin(k, a + (Vec3f::from(*b) - a) * t);
             }
             let gust = 4.0 * t * (1.0 - t) * (1.0 + (9.0 * t).sin());
-            let wind = Point::from(self.wind) * gust;
+            let wind = Vec3f::from(self.wind) * gust;
             cloth.step(
-                &Forces {
+                &StepConditions {
                     wind,
                     damping: self.damping,
                     step: STEP,
@@ -138,8 +140,8 @@ impl Scene {
             let t = step as f32 / settle_steps as f32;
             let damping = self.damping + 10.0 * t;
             cloth.step(
-                &Forces {
-                    wind: Point::zeros(),
+                &StepConditions {
+                    wind: Vec3f::zeros(),
                     damping,
                     step: STEP,
                 },
@@ -151,8 +153,8 @@ impl Scene {
         }
         for _ in 0..250 {
             cloth.step(
-                &Forces {
-                    wind: Point::zeros(),
+                &StepConditions {
+                    wind: Vec3f::zeros(),
                     damping: 40.0,
                     step: 0.5 * STEP,
                 },
@@ -164,9 +166,9 @@ impl Scene {
     }
 }
 
-/// Where vertex `k` lies on the flat sheet, centred at the origin.
-fn flat(k: usize) -> Point {
-    Point::new(
+/// Position of vertex `k` on the flat sheet, which is centred at the origin.
+fn flat(k: usize) -> Vec3f {
+    Vec3f::new(
         (k % SIDE) as f32 * SPACING - 0.5,
         (k / SIDE) as f32 * SPACING - 0.5,
         0.0,
@@ -177,9 +179,9 @@ fn log_uniform(rng: &mut ChaCha8Rng, low: f32, high: f32) -> f32 {
     (rng.random_range(low.ln()..high.ln())).exp()
 }
 
-fn direction(rng: &mut ChaCha8Rng) -> Point {
+fn direction(rng: &mut ChaCha8Rng) -> Vec3f {
     loop {
-        let p = Point::from_fn(|_, _| rng.random_range(-1.0..1.0));
+        let p = Vec3f::from_fn(|_, _| rng.random_range(-1.0..1.0));
         let n = p.norm();
         if n > 0.1 && n < 1.0 {
             return p / n;
@@ -188,7 +190,7 @@ fn direction(rng: &mut ChaCha8Rng) -> Point {
 }
 
 /// The flat sheet with a few smooth waves and a little noise of total height about `height`.
-fn uneven(height: f32, rng: &mut ChaCha8Rng) -> Vec<Point> {
+fn uneven(height: f32, rng: &mut ChaCha8Rng) -> Vec<Vec3f> {
     let waves: Vec<[f32; 4]> = (0..4)
         .map(|_| {
             let turn = rng.random_range(0.0..std::f32::consts::TAU);
@@ -214,25 +216,25 @@ fn uneven(height: f32, rng: &mut ChaCha8Rng) -> Vec<Point> {
         .collect()
 }
 
-fn draw_pins(kind: Kind, rng: &mut ChaCha8Rng) -> Vec<usize> {
+fn draw_pins(kind: SceneKind, rng: &mut ChaCha8Rng) -> Vec<usize> {
     let corners = [0, SIDE - 1, VERTICES - 1, VERTICES - SIDE];
     let turn = rng.random_range(0..4);
     let corner = |n: usize| corners[(n + turn) % 4];
     match kind {
-        Kind::FourCorners => corners.to_vec(),
-        Kind::ThreeCorners => vec![corner(0), corner(1), corner(2)],
-        Kind::TwoCorners => vec![corner(0), corner(1 + usize::from(rng.random_bool(0.4)))],
-        Kind::Curtain => {
+        SceneKind::FourCorners => corners.to_vec(),
+        SceneKind::ThreeCorners => vec![corner(0), corner(1), corner(2)],
+        SceneKind::TwoCorners => vec![corner(0), corner(1 + usize::from(rng.random_bool(0.4)))],
+        SceneKind::Curtain => {
             let hooks = rng.random_range(3..10);
             (0..hooks)
                 .map(|n| (n * (SIDE - 1) + (hooks - 1) / 2) / (hooks - 1))
                 .collect()
         }
-        Kind::Twisted => (0..3)
+        SceneKind::Twisted => (0..3)
             .map(|n| n * (SIDE - 1) / 2)
             .flat_map(|i| [i, VERTICES - SIDE + i])
             .collect(),
-        Kind::Points => {
+        SceneKind::Points => {
             let mut pins: Vec<usize> = (0..rng.random_range(1..4))
                 .map(|_| rng.random_range(0..VERTICES))
                 .collect();
@@ -240,25 +242,25 @@ fn draw_pins(kind: Kind, rng: &mut ChaCha8Rng) -> Vec<usize> {
             pins.dedup();
             pins
         }
-        Kind::Draped if rng.random_bool(0.25) => vec![corner(0)],
-        Kind::Draped => Vec::new(),
+        SceneKind::Draped if rng.random_bool(0.25) => vec![corner(0)],
+        SceneKind::Draped => Vec::new(),
     }
 }
 
-/// Targets drawn around the shrunken, turned flat places of the pins, no two further apart than the cloth allows.
-fn scattered(pins: &[usize], rng: &mut ChaCha8Rng) -> Vec<Point> {
+/// Targets around the shrunken and rotated flat positions of the pins, no two further apart than the cloth allows.
+fn scattered(pins: &[usize], rng: &mut ChaCha8Rng) -> Vec<Vec3f> {
     let shrink = rng.random_range(0.0..0.9);
     let mut spread = rng.random_range(0.1..0.75);
     let tilt = rng.random_range(0.0..std::f32::consts::FRAC_PI_2);
     let turn = rng.random_range(0.0..std::f32::consts::TAU);
-    let axis = Unit::new_normalize(Point::new(turn.cos(), turn.sin(), 0.0));
+    let axis = Unit::new_normalize(Vec3f::new(turn.cos(), turn.sin(), 0.0));
     let rotation = Rotation3::from_axis_angle(&axis, tilt);
     loop {
-        let targets: Vec<Point> = pins
+        let targets: Vec<Vec3f> = pins
             .iter()
             .map(|&k| {
                 rotation * flat(k) * shrink
-                    + Point::from_fn(|_, _| rng.random_range(-spread..spread))
+                    + Vec3f::from_fn(|_, _| rng.random_range(-spread..spread))
             })
             .collect();
         if allowed(pins, &targets) {
@@ -268,8 +270,8 @@ fn scattered(pins: &[usize], rng: &mut ChaCha8Rng) -> Vec<Point> {
     }
 }
 
-/// Hooks of a curtain, drawn together and pulled out of line.
-fn gathered(pins: &[usize], rng: &mut ChaCha8Rng) -> Vec<Point> {
+/// Targets of the hooks of a curtain: closer together than at rest, and off the line.
+fn gathered(pins: &[usize], rng: &mut ChaCha8Rng) -> Vec<Vec3f> {
     let width = rng.random_range(0.3..0.9);
     let gap = 0.97 / (pins.len() - 1) as f32;
     let depth = (gap * gap * (1.0 - width * width)).sqrt() * 0.5;
@@ -277,7 +279,7 @@ fn gathered(pins: &[usize], rng: &mut ChaCha8Rng) -> Vec<Point> {
     pins.iter()
         .map(|&k| {
             let x = (k % SIDE) as f32 * SPACING - 0.5;
-            Point::new(
+            Vec3f::new(
                 width * 0.97 * x,
                 rng.random_range(-depth..depth),
                 0.3 + slope * width * x,
@@ -286,23 +288,23 @@ fn gathered(pins: &[usize], rng: &mut ChaCha8Rng) -> Vec<Point> {
         .collect()
 }
 
-/// Two edges brought nearer to each other, gathered, and turned against each other about the line between them.
-fn twisted(pins: &[usize], rng: &mut ChaCha8Rng) -> Vec<Point> {
+/// Targets of two edges that are moved together, gathered, and turned against each other about the line between them.
+fn twisted(pins: &[usize], rng: &mut ChaCha8Rng) -> Vec<Vec3f> {
     let angle = rng.random_range(0.3..1.6f32);
     let mut near = rng.random_range(0.4..0.9f32);
     let gather = rng.random_range(0.3..0.9f32);
     let lean = Rotation3::from_axis_angle(
-        &Unit::new_normalize(Point::new(1.0, 0.3, 0.0)),
+        &Unit::new_normalize(Vec3f::new(1.0, 0.3, 0.0)),
         rng.random_range(0.0..std::f32::consts::FRAC_PI_2),
     );
     loop {
-        let targets: Vec<Point> = pins
+        let targets: Vec<Vec3f> = pins
             .iter()
             .map(|&k| {
                 let p = flat(k);
-                let turn = Rotation3::from_axis_angle(&Point::y_axis(), angle * p.y.signum());
-                lean * (turn * Point::new(gather * p.x, 0.0, 0.0)
-                    + Point::new(0.0, near * p.y, 0.0))
+                let turn = Rotation3::from_axis_angle(&Vec3f::y_axis(), angle * p.y.signum());
+                lean * (turn * Vec3f::new(gather * p.x, 0.0, 0.0)
+                    + Vec3f::new(0.0, near * p.y, 0.0))
             })
             .collect();
         if allowed(pins, &targets) {
@@ -313,7 +315,7 @@ fn twisted(pins: &[usize], rng: &mut ChaCha8Rng) -> Vec<Point> {
 }
 
 /// Whether no two targets are further apart than the flat sheet allows.
-fn allowed(pins: &[usize], targets: &[Point]) -> bool {
+fn allowed(pins: &[usize], targets: &[Vec3f]) -> bool {
     (0..pins.len()).all(|a| {
         (0..a).all(|b| {
             (targets[a] - targets[b]).norm() <= 0.97 * (flat(pins[a]) - flat(pins[b])).norm()
@@ -321,7 +323,7 @@ fn allowed(pins: &[usize], targets: &[Point]) -> bool {
     })
 }
 
-fn draw_obstacles(rng: &mut ChaCha8Rng) -> Vec<Collider> {
+fn draw_obstacles(rng: &mut ChaCha8Rng) -> Vec<Obstacle> {
     let mut spot = |top: f32| {
         [
             rng.random_range(-0.2..0.2),
@@ -330,13 +332,13 @@ fn draw_obstacles(rng: &mut ChaCha8Rng) -> Vec<Collider> {
         ]
     };
     let places = [spot(0.0), spot(0.0)];
-    let floor = Collider::Floor {
+    let floor = Obstacle::Floor {
         z: rng.random_range(-0.8..-0.1),
     };
     let below = |p: [f32; 3], top: f32| [p[0], p[1], p[2] - top];
     let sphere = |rng: &mut ChaCha8Rng, place: [f32; 3]| {
         let radius = rng.random_range(0.08..0.4);
-        Collider::Sphere {
+        Obstacle::Sphere {
             center: below(place, radius),
             radius,
         }
@@ -348,7 +350,7 @@ fn draw_obstacles(rng: &mut ChaCha8Rng) -> Vec<Collider> {
             let radius = rng.random_range(0.03..0.3);
             let turn = rng.random_range(0.0..std::f32::consts::TAU);
             vec![
-                Collider::Bar {
+                Obstacle::Bar {
                     center: below(places[0], radius),
                     along: [turn.cos(), turn.sin()],
                     radius,
@@ -364,7 +366,7 @@ fn draw_obstacles(rng: &mut ChaCha8Rng) -> Vec<Collider> {
             ];
             let radius = rng.random_range(0.01..0.08);
             vec![
-                Collider::Block {
+                Obstacle::Block {
                     center: below(places[0], 0.5 + radius),
                     half,
                     radius,
@@ -388,7 +390,7 @@ mod tests {
             prop_assert_eq!(scene.pins.len(), scene.targets.len());
             for (a, p) in scene.pins.iter().zip(&scene.targets) {
                 for (b, q) in scene.pins.iter().zip(&scene.targets) {
-                    let apart = (Point::from(*p) - Point::from(*q)).norm();
+                    let apart = (Vec3f::from(*p) - Vec3f::from(*q)).norm();
                     prop_assert!(apart <= (flat(*a) - flat(*b)).norm() + 1e-5);
                 }
             }

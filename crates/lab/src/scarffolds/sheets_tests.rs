@@ -1,26 +1,26 @@
-//! Laws of making sheets: broken-off runs, growing sets, foreign files.
+//! Laws of making sheets: interrupted runs, growing sets, files of another seed.
 
 use super::*;
-use crate::scarffolds::cloth::VERTICES;
+use crate::scarffolds::lattice::{SIDE, SPACING, VERTICES};
 
-/// Sheets that cost no simulation: flat, at the height of their index.
-fn flat(index: usize) -> Result<(Sheet, Record), ScarfError> {
+/// A flat sheet at the height of its index, made without a simulation.
+fn flat(index: usize) -> Result<(SimulatedSheet, SheetRecord), ScarfError> {
     let scene = Scene::draw(&mut ChaCha8Rng::seed_from_u64(index as u64));
     let z = index as f32;
     let positions = (0..VERTICES)
         .map(|k| [(k % SIDE) as f32 * SPACING, (k / SIDE) as f32 * SPACING, z])
         .collect();
-    let record = Record {
+    let record = SheetRecord {
         index,
         scene,
         dropped_crossing: 1,
         dropped_strain: 0,
         strain: 0.0,
     };
-    Ok((Sheet { positions }, record))
+    Ok((SimulatedSheet { positions }, record))
 }
 
-fn gather(count: usize, out: &Path, maker: Maker) -> Result<Summary, ScarfError> {
+fn gather(count: usize, out: &Path, maker: Maker) -> Result<SheetSetSummary, ScarfError> {
     collect(count, 4, out, &|_| (), maker)
 }
 
@@ -29,7 +29,7 @@ fn bytes(out: &Path) -> [Vec<u8>; 2] {
 }
 
 #[test]
-fn a_broken_off_run_ends_like_an_unbroken_one() {
+fn an_interrupted_run_ends_like_an_uninterrupted_one() {
     let (a, b) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let summary = gather(23, a.path(), &flat).unwrap();
     assert_eq!((summary.sheets, summary.crossing_share), (23, 0.5));
@@ -37,7 +37,7 @@ fn a_broken_off_run_ends_like_an_unbroken_one() {
         if index < 20 {
             flat(index)
         } else {
-            Err(ScarfError::NoSheet { index })
+            Err(ScarfError::NoSheet { index, attempts: 1 })
         }
     };
     assert!(gather(23, b.path(), &breaking).is_err());
@@ -58,7 +58,7 @@ fn a_broken_off_run_ends_like_an_unbroken_one() {
     assert_eq!(
         std::fs::read_dir(b.path()).unwrap().count(),
         2,
-        "parts are cleared away"
+        "parts are deleted"
     );
 }
 
@@ -80,7 +80,7 @@ fn a_finished_set_grows() {
 }
 
 #[test]
-fn a_made_sheet_passes_its_checks_and_depends_on_seed_and_index_alone() {
+fn a_sheet_passes_its_checks_and_depends_on_seed_and_index_only() {
     let (sheet, record) = make(4, 3).unwrap();
     assert!(record.strain < 0.005, "{}", record.strain);
     assert!(!sheet.crosses_itself());
@@ -90,7 +90,7 @@ fn a_made_sheet_passes_its_checks_and_depends_on_seed_and_index_alone() {
 #[test]
 fn parts_of_another_seed_are_refused() {
     let dir = tempfile::tempdir().unwrap();
-    let sheet = Sheet {
+    let sheet = SimulatedSheet {
         positions: vec![[0.0; 3]; VERTICES],
     };
     let part = PartHeader {
@@ -123,12 +123,12 @@ fn a_sheet_folded_through_itself_crosses() {
             0.0,
         ]
     };
-    let mut sheet = Sheet {
+    let mut sheet = SimulatedSheet {
         positions: (0..VERTICES).map(flat).collect(),
     };
     assert!(!sheet.crosses_itself());
     for p in sheet.positions.iter_mut().filter(|p| p[0] > 0.5) {
-        // the right half stands back over the left one and dips through it
+        // The right half is folded over the left one and passes through it.
         *p = [1.0 - p[0], p[1], 0.1 - 0.4 * (p[0] - 0.5)];
     }
     assert!(sheet.crosses_itself());

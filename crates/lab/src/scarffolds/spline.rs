@@ -1,19 +1,19 @@
 //! A sheet as a smooth surface: the natural bicubic spline through its vertices.
 
-use super::cloth::{SIDE as SHEET, VERTICES};
-use super::sheets::Sheet;
+use super::lattice::{SIDE as SHEET, VERTICES};
+use super::sheet::SimulatedSheet;
 use nalgebra::Vector3;
 
-/// Natural bicubic spline through a sheet's vertices, as B-spline coefficients with one more on every side.
+/// Natural bicubic spline through a sheet's vertices, as B-spline coefficients: one row or column more than vertices on every side.
 #[derive(Debug, Clone)]
-pub(super) struct Spline {
+pub(super) struct SheetSpline {
     coefficients: Vec<Vector3<f32>>,
 }
 
 const PADDED: usize = SHEET + 2;
 
-impl Spline {
-    pub(super) fn new(sheet: &Sheet) -> Self {
+impl SheetSpline {
+    pub(super) fn new(sheet: &SimulatedSheet) -> Self {
         assert_eq!(
             sheet.positions.len(),
             VERTICES,

@@ -1,5 +1,5 @@
-//! From samples to batches: symmetries, noise on what is known, revealed anchors, normalisation, the network's frame.
-//! Batch `k` depends on the seed and `k` alone, so that a resumed run sees what an unbroken one would have seen.
+//! From samples to batches: symmetries, noise on known cells, revealed anchors, normalisation, the network's frame. Batch `k` depends on the
+//! seed and `k` only, so a resumed run gets the same batches as an uninterrupted one.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -9,55 +9,55 @@ use nalgebra::Vector3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::scarffolds::samples::Sample;
+use crate::scarffolds::samples::TrainingSample;
 use darn_geometry::grid::{CELLS, NormalGrid, SIDE, neighbour_pairs};
 use darn_net::symmetry::origins;
 use darn_net::{InputKind, NetworkFrame, UnetConfig, plates};
 
-/// Share of samples whose known cells are noisy.
+/// Share of samples with noise on the known cells.
 const NOISY: f64 = 0.2;
 /// Largest standard deviation of that noise, in cells.
 const NOISE_CELLS: f32 = 0.25;
-/// Share of samples in which a few hole cells are revealed, as a user's anchors would be.
+/// Share of samples in which a few hole cells are known, like a user's anchors.
 const ANCHORED: f64 = 0.15;
-/// Most cells revealed so.
+/// Most such cells of a sample.
 const ANCHORS: usize = 6;
-/// Weight in the data loss of cells that were known: keeps the network's opinion sane there at little cost.
+/// Weight of known cells in the data loss: keeps predictions plausible there.
 const KNOWN_WEIGHT: f32 = 0.1;
-/// The base of a network that wants none.
+/// The base of a sample without one.
 static NO_BASE: [[f32; 3]; CELLS] = [[0.0; 3]; CELLS];
-/// Batches each thread makes ahead.
-const AHEAD: usize = 2;
+/// Batches that each thread makes in advance.
+const PREFETCHED: usize = 2;
 
 /// A sample in the network's units and frame.
 #[derive(Debug, Clone)]
-pub struct Prepared {
-    /// What the network gets, its base included.
+pub struct PreparedSample {
+    /// The network's input, with its base.
     pub input: NormalGrid,
-    /// Where +z of the sample is in the network's frame.
+    /// Direction of the sample's +z in the network's frame.
     pub up: [f32; 3],
     /// The truth in the same units and frame; zero where not `valid`.
     pub truth: Vec<[f32; 3]>,
     /// Cells with a truth.
     pub valid: Vec<bool>,
-    /// Cells given.
+    /// Known cells.
     pub known: Vec<bool>,
-    /// Cells to be filled in.
+    /// Hole cells.
     pub hole: Vec<bool>,
 }
 
-/// Many samples as planes, ready to become tensors.
+/// Some samples as planes of numbers, ready to become tensors.
 #[derive(Debug, Clone, Default)]
-pub struct Batch {
-    /// Samples.
+pub struct TrainingBatch {
+    /// Number of samples.
     pub count: usize,
     /// `[count, 3, 64, 64]`.
     pub positions: Vec<f32>,
     /// `[count, 1, 64, 64]`.
     pub known: Vec<f32>,
-    /// The fill under anchors, zero where there is none; `[count, 3, 64, 64]`.
+    /// The base that the membrane is added to, zero where there is none; `[count, 3, 64, 64]`.
     pub base: Vec<f32>,
-    /// Where +z of the sample is, `[count, 3]`.
+    /// Direction of each sample's +z, `[count, 3]`.
     pub up: Vec<f32>,
     /// `[count, 3, 64, 64]`.
     pub truth: Vec<f32>,
@@ -71,25 +71,33 @@ pub struct Batch {
     pub pairs_v: Vec<f32>,
 }
 
-/// Brings a sample to the network's units and frame without changing it otherwise; `None` when too little is known.
-pub fn prepare(sample: &Sample, network: &UnetConfig) -> Option<Prepared> {
+/// Brings a sample to the network's units and frame; `None` when too few cells are known.
+pub fn prepare(sample: &TrainingSample, network: &UnetConfig) -> Option<PreparedSample> {
     let still = vec![[0.0; 3]; CELLS];
     let prepared = prepare_noisy(sample, &still, network)?;
     with_bases(vec![prepared], &sample.known, network).pop()
 }
 
-/// Random variants of samples of which the same cells are known: one of the grid's 8 symmetries for all, each perhaps mirrored, noisy or with
-/// anchors. Those of which too little is known are left out.
-pub fn augment(samples: &[Sample], network: &UnetConfig, rng: &mut ChaCha8Rng) -> Vec<Prepared> {
+/// Random variants of samples with the same known cells: one of the grid's 8 symmetries for all; each sample may be mirrored, get noise or
+/// get anchors. Samples with too few known cells are left out.
+pub(super) fn augment(
+    samples: &[TrainingSample],
+    network: &UnetConfig,
+    rng: &mut ChaCha8Rng,
+) -> Vec<PreparedSample> {
     let symmetry = rng.random_range(0..8);
-    let samples: Vec<Sample> = samples.iter().map(|s| symmetric(s, symmetry)).collect();
+    let samples: Vec<TrainingSample> = samples.iter().map(|s| symmetric(s, symmetry)).collect();
     let scanned = samples.first().map(|s| s.known.clone());
     let prepared = samples.into_iter().filter_map(|s| vary(s, network, rng));
     with_bases(prepared.collect(), &scanned.unwrap_or_default(), network)
 }
 
-/// The sample perhaps mirrored, noisy or with anchors.
-fn vary(mut sample: Sample, network: &UnetConfig, rng: &mut ChaCha8Rng) -> Option<Prepared> {
+/// A random variant of one sample.
+fn vary(
+    mut sample: TrainingSample,
+    network: &UnetConfig,
+    rng: &mut ChaCha8Rng,
+) -> Option<PreparedSample> {
     if network.frame.turns() && rng.random() {
         sample.truth.iter_mut().for_each(|p| p[0] = -p[0]);
     }
@@ -113,8 +121,12 @@ fn vary(mut sample: Sample, network: &UnetConfig, rng: &mut ChaCha8Rng) -> Optio
     prepare_noisy(&sample, &noise, network)
 }
 
-/// Gives grids the base that the network wants; the `scanned` cells are known in all of them, without anchors.
-fn with_bases(mut samples: Vec<Prepared>, scanned: &[bool], network: &UnetConfig) -> Vec<Prepared> {
+/// Gives samples the base that the network needs; the `scanned` cells are known in all of them, anchors not included.
+fn with_bases(
+    mut samples: Vec<PreparedSample>,
+    scanned: &[bool],
+    network: &UnetConfig,
+) -> Vec<PreparedSample> {
     if network.input != InputKind::Plate {
         return samples;
     }
@@ -130,8 +142,12 @@ fn with_bases(mut samples: Vec<Prepared>, scanned: &[bool], network: &UnetConfig
     samples
 }
 
-/// A sample without its base; `noise` is in cells.
-fn prepare_noisy(sample: &Sample, noise: &[[f32; 3]], network: &UnetConfig) -> Option<Prepared> {
+/// A prepared sample without its base; `noise` of each cell is in cells.
+fn prepare_noisy(
+    sample: &TrainingSample,
+    noise: &[[f32; 3]],
+    network: &UnetConfig,
+) -> Option<PreparedSample> {
     let point = |k: usize| Vector3::from(sample.truth[k]);
     let known = |k: &usize| sample.known[*k];
     let count = (0..CELLS).filter(known).count();
@@ -181,7 +197,7 @@ fn prepare_noisy(sample: &Sample, noise: &[[f32; 3]], network: &UnetConfig) -> O
             }
         })
         .collect();
-    Some(Prepared {
+    Some(PreparedSample {
         input,
         up: frame.up(),
         truth,
@@ -192,9 +208,9 @@ fn prepare_noisy(sample: &Sample, noise: &[[f32; 3]], network: &UnetConfig) -> O
 }
 
 /// The sample under one of the grid's symmetries.
-fn symmetric(sample: &Sample, symmetry: usize) -> Sample {
+fn symmetric(sample: &TrainingSample, symmetry: usize) -> TrainingSample {
     let from = origins(symmetry);
-    Sample {
+    TrainingSample {
         truth: from.iter().map(|k| sample.truth[*k]).collect(),
         valid: from.iter().map(|k| sample.valid[*k]).collect(),
         known: from.iter().map(|k| sample.known[*k]).collect(),
@@ -208,12 +224,12 @@ fn gaussian(rng: &mut ChaCha8Rng) -> f32 {
     radius * (std::f32::consts::TAU * rng.random::<f32>()).cos()
 }
 
-impl Batch {
-    /// Joins prepared samples.
-    pub fn of(samples: &[Prepared]) -> Batch {
-        let mut batch = Batch {
+impl TrainingBatch {
+    /// The batch of some samples.
+    pub fn of(samples: &[PreparedSample]) -> TrainingBatch {
+        let mut batch = TrainingBatch {
             count: samples.len(),
-            ..Batch::default()
+            ..TrainingBatch::default()
         };
         let flag = |b: bool| f32::from(u8::from(b));
         for sample in samples {
@@ -254,14 +270,14 @@ impl Batch {
     }
 }
 
-impl Batch {
-    /// Some of the samples.
-    pub fn part(&self, samples: Range<usize>) -> Batch {
+impl TrainingBatch {
+    /// A range of the samples.
+    pub fn part(&self, samples: Range<usize>) -> TrainingBatch {
         let part = |values: &[f32]| {
             let one = values.len() / self.count.max(1);
             values[samples.start * one..samples.end * one].to_vec()
         };
-        Batch {
+        TrainingBatch {
             count: samples.len(),
             positions: part(&self.positions),
             known: part(&self.known),
@@ -276,15 +292,15 @@ impl Batch {
     }
 }
 
-/// Draws samples of which the same cells are known, one at least.
-pub type Source = Arc<dyn Fn(&mut ChaCha8Rng) -> Vec<Sample> + Send + Sync>;
+/// Draws samples with the same known cells, at least one.
+pub type SampleSource = Arc<dyn Fn(&mut ChaCha8Rng) -> Vec<TrainingSample> + Send + Sync>;
 
-/// What batches are made of.
+/// Makes batches from samples.
 #[derive(Clone)]
-pub struct Recipe {
-    /// Draws samples.
-    pub source: Source,
-    /// The network that they are for.
+pub struct BatchGenerator {
+    /// Draws the samples.
+    pub source: SampleSource,
+    /// The network to train.
     pub network: UnetConfig,
     /// Samples in a batch.
     pub size: usize,
@@ -292,16 +308,16 @@ pub struct Recipe {
     pub seed: u64,
 }
 
-impl Recipe {
-    /// Batch `index`: the same for the same seed, whenever and wherever it is made.
-    pub fn batch(&self, index: u64) -> Batch {
+impl BatchGenerator {
+    /// Batch `index`; depends on the seed and `index` only.
+    pub fn batch(&self, index: u64) -> TrainingBatch {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(index + 1);
-        Batch::of(&self.samples(&mut rng))
+        TrainingBatch::of(&self.samples(&mut rng))
     }
 
-    /// A batch's samples.
-    pub fn samples(&self, rng: &mut ChaCha8Rng) -> Vec<Prepared> {
+    /// The samples of one batch.
+    pub fn samples(&self, rng: &mut ChaCha8Rng) -> Vec<PreparedSample> {
         let mut samples = Vec::with_capacity(self.size);
         while samples.len() < self.size {
             samples.extend(augment(&(self.source)(rng), &self.network, rng));
@@ -311,37 +327,37 @@ impl Recipe {
     }
 }
 
-/// Batches made ahead by threads, in order.
-pub struct Ahead {
-    threads: Vec<Receiver<Batch>>,
+/// Batches in order, made in advance by threads.
+pub(super) struct BatchPrefetcher {
+    threads: Vec<Receiver<TrainingBatch>>,
     next: u64,
 }
 
-impl Ahead {
-    /// Starts `threads` threads that make the batches from `first` on; they end when this is dropped.
-    pub fn start(recipe: &Recipe, first: u64, threads: usize) -> Ahead {
+impl BatchPrefetcher {
+    /// Starts `threads` threads that make the batches from number `first` on; they end when this is dropped.
+    pub fn start(generator: &BatchGenerator, first: u64, threads: usize) -> BatchPrefetcher {
         let threads = threads.max(1) as u64;
         let receivers = (0..threads).map(|thread| {
-            let (sender, receiver) = sync_channel(AHEAD);
-            let recipe = recipe.clone();
-            // Thread t makes the batches whose index leaves t: the order does not depend on who is faster.
+            let (sender, receiver) = sync_channel(PREFETCHED);
+            let generator = generator.clone();
+            // Thread t makes the batches with index ≡ t: the order does not depend on the speed of the threads.
             let start = first + (thread + threads - first % threads) % threads;
             std::thread::spawn(move || {
                 let mut index = start;
-                while sender.send(recipe.batch(index)).is_ok() {
+                while sender.send(generator.batch(index)).is_ok() {
                     index += threads;
                 }
             });
             receiver
         });
-        Ahead {
+        BatchPrefetcher {
             threads: receivers.collect(),
             next: first,
         }
     }
 
-    /// The next batch; `None` when its thread has died.
-    pub fn next_batch(&mut self) -> Option<Batch> {
+    /// The next batch; `None` when its thread has ended.
+    pub fn next_batch(&mut self) -> Option<TrainingBatch> {
         let thread = (self.next % self.threads.len() as u64) as usize;
         self.next += 1;
         self.threads.get(thread)?.recv().ok()

@@ -1,4 +1,4 @@
-//! Checkpoints: everything a run needs to go on, in one safetensors file of f32, replaced atomically.
+//! Checkpoints: the state that a run continues from, in one safetensors file of f32 that is replaced atomically.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 
-use super::student::Snapshot;
-use super::{TrainError, TrainOptions};
+use super::error::TrainError;
+use super::options::TrainOptions;
+use super::snapshot::TrainSnapshot;
 use darn_net::weights::NamedTensors;
 
 /// File name inside the output directory.
@@ -15,18 +16,18 @@ const FILE: &str = "checkpoint.safetensors";
 const KEY: &str = "darn-checkpoint";
 
 #[derive(Debug, Serialize, Deserialize)]
-struct Header {
+struct CheckpointHeader {
     step: u64,
     seconds: f64,
     options: TrainOptions,
 }
 
-/// Writes a run's state after so many seconds of training, all sittings together, into `dir`.
+/// Writes the state of a run into `dir`; `seconds` is the training time of all sessions together.
 ///
 /// # Errors
 /// A file that cannot be written.
 pub fn save(
-    snapshot: &Snapshot,
+    snapshot: &TrainSnapshot,
     seconds: f64,
     options: &TrainOptions,
     dir: &Path,
@@ -50,9 +51,9 @@ pub fn save(
         path: path.clone(),
         reason,
     };
-    let header = Header {
+    let header = CheckpointHeader {
         step: snapshot.step,
-        // Short decimals are read back as they were; serde_json may miss the last digit of others.
+        // Decimals of three digits are read back exactly; serde_json may lose the last digit of longer ones.
         seconds: (seconds * 1e3).round() / 1e3,
         options: options.clone(),
     };
@@ -79,11 +80,11 @@ pub fn save(
     replace(&path, &file)
 }
 
-/// Reads the state in `dir` back, and the seconds it was trained for.
+/// Reads the state in `dir`, and the training time of all sessions together in seconds.
 ///
 /// # Errors
 /// No checkpoint, a damaged one, or one of another architecture, batch size, seed or trainer.
-pub fn load(options: &TrainOptions, dir: &Path) -> Result<(Snapshot, f64), TrainError> {
+pub fn load(options: &TrainOptions, dir: &Path) -> Result<(TrainSnapshot, f64), TrainError> {
     let path = dir.join(FILE);
     let bytes = std::fs::read(&path).map_err(|source| TrainError::File {
         path: path.clone(),
@@ -100,7 +101,8 @@ pub fn load(options: &TrainOptions, dir: &Path) -> Result<(Snapshot, f64), Train
         .as_ref()
         .and_then(|m| m.get(KEY))
         .ok_or_else(|| refuse("not a checkpoint".into()))?;
-    let header: Header = serde_json::from_str(header).map_err(|e| refuse(e.to_string()))?;
+    let header: CheckpointHeader =
+        serde_json::from_str(header).map_err(|e| refuse(e.to_string()))?;
     let same = |o: &TrainOptions| (o.network, o.batch, o.seed, o.trainer);
     if same(&header.options) != same(options) {
         return Err(refuse(
@@ -126,7 +128,7 @@ pub fn load(options: &TrainOptions, dir: &Path) -> Result<(Snapshot, f64), Train
             .insert(name.to_owned(), (view.shape().to_vec(), values));
     }
     let mut group = |name: &str| groups.remove(name).unwrap_or_default();
-    let snapshot = Snapshot {
+    let snapshot = TrainSnapshot {
         network: group("network"),
         averaged: group("averaged"),
         moments: (group("first").into_values())
@@ -138,7 +140,10 @@ pub fn load(options: &TrainOptions, dir: &Path) -> Result<(Snapshot, f64), Train
     Ok((snapshot, header.seconds))
 }
 
-/// Writes a file so that a reader sees the old or the new one, never a part.
+/// Replaces a file so that a reader sees the old or the new file, never a part.
+///
+/// # Errors
+/// A file that cannot be written.
 pub fn replace(path: &Path, bytes: &[u8]) -> Result<(), TrainError> {
     let failed = |path: &Path| {
         let path = path.to_owned();

@@ -1,25 +1,26 @@
-//! The loss: where cells are, how they differ from their neighbours, how far they are from them, and what comes too near. All in cells.
+//! The loss in burn, which is its definition: positions, differences of neighbours, lengths between neighbours, and repulsion of cloth that
+//! comes too close. All lengths are in cells.
 //!
 //! L = L_data + α L_grad + γ L_stretch + β L_selfpen. The paper (§3.4) has the first, second and last of them, with squared errors:
-//! that is [`LossWeights::paper`]. By default distances are softened near zero only (√(r² + δ²) − δ), so that one crumpled sample does not
-//! drown a batch, and lengths between neighbours count as well.
+//! that is [`LossWeights::paper`]. By default distances are quadratic near zero only (√(r² + δ²) − δ), so that one crumpled sample does not
+//! dominate a batch, and lengths between neighbours count as well.
 
 use burn::tensor::backend::Backend;
 use burn::tensor::{Int, Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
-use super::batch::Batch;
-use super::near::{REACH, near_pairs};
+use super::batch::TrainingBatch;
+use super::near_pairs::{REACH, near_pairs};
 use darn_geometry::grid::{CELLS, SIDE};
 
 /// Where the data term turns from quadratic to linear, in cells.
 pub(super) const DATA_BEND: f32 = 1.0;
 /// The same for differences of neighbours.
 pub(super) const GRADIENT_BEND: f32 = 0.25;
-/// Guards the root of a length, in cells squared.
+/// Added under the root of a length, in cells squared: keeps its derivative finite.
 pub(super) const LENGTH_GUARD: f32 = 1e-4;
 
-/// How an error becomes a loss.
+/// The penalty of an error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LossKind {
@@ -34,11 +35,11 @@ pub enum LossKind {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct LossWeights {
-    /// How errors of positions and of differences count.
+    /// Penalty of the errors of positions and of differences.
     pub kind: LossKind,
-    /// α: differences of neighbours, which give folds their crispness.
+    /// α: differences of neighbours, which keep folds sharp.
     pub gradient: f64,
-    /// γ: lengths between neighbours, which give the cloth its amount.
+    /// γ: lengths between neighbours, which keep the area of the cloth.
     pub stretch: f64,
     /// β: repulsion of cloth from cloth.
     pub self_penetration: f64,
@@ -56,8 +57,8 @@ impl Default for LossWeights {
 }
 
 impl LossWeights {
-    /// The default with a repulsion that is felt: a hole cell half the reach away from another layer costs as much as one 8 cells off. With a
-    /// weight of 1 the network cuts itself as often as without.
+    /// The default with a strong repulsion: a hole cell half the reach away from another layer costs as much as a cell with an error of 8
+    /// cells. With a weight of 1 the cloth intersects itself as often as without.
     pub fn interpen() -> Self {
         LossWeights {
             self_penetration: 30.0,
@@ -76,9 +77,49 @@ impl LossWeights {
     }
 }
 
-/// The terms of a loss, each a mean over what it looks at.
+/// The numbers of a loss.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct LossTerms {
+    /// Weighted sum of the terms.
+    pub total: f32,
+    /// Mean softened or squared distance to the truth.
+    pub data: f32,
+    /// Mean softened or squared error of differences along u and v.
+    pub gradient: f32,
+    /// Mean squared error of lengths between neighbours.
+    pub stretch: f32,
+    /// Repulsion of near cells, for each hole cell.
+    pub self_penetration: f32,
+}
+
+impl LossTerms {
+    /// All terms times a factor.
+    pub(super) fn scaled(self, factor: f32) -> Self {
+        LossTerms {
+            total: self.total * factor,
+            data: self.data * factor,
+            gradient: self.gradient * factor,
+            stretch: self.stretch * factor,
+            self_penetration: self.self_penetration * factor,
+        }
+    }
+}
+
+impl std::iter::Sum for LossTerms {
+    fn sum<I: Iterator<Item = Self>>(terms: I) -> Self {
+        terms.fold(LossTerms::default(), |sum, terms| LossTerms {
+            total: sum.total + terms.total,
+            data: sum.data + terms.data,
+            gradient: sum.gradient + terms.gradient,
+            stretch: sum.stretch + terms.stretch,
+            self_penetration: sum.self_penetration + terms.self_penetration,
+        })
+    }
+}
+
+/// A loss as tensors, each term a mean.
 #[derive(Debug, Clone)]
-pub struct Loss<B: Backend> {
+pub(super) struct LossTensors<B: Backend> {
     /// Weighted sum, `[1]`.
     pub total: Tensor<B, 1>,
     /// Mean softened or squared distance to the truth.
@@ -87,34 +128,48 @@ pub struct Loss<B: Backend> {
     pub gradient: Tensor<B, 1>,
     /// Mean squared error of lengths between neighbours, over the same pairs.
     pub stretch: Tensor<B, 1>,
-    /// Sum of (1 − d)² over pairs of cells that are d < 1 cell apart in space but no neighbours on the sheet, a hole cell in each, ÷ number
-    /// of hole cells. Zero, and not computed, when its weight is zero.
+    /// Sum of (1 − d)² over pairs of cells that are d < 1 cell apart in space but not neighbours on the sheet, at least one of them a hole
+    /// cell, ÷ number of hole cells. Zero, and not computed, when its weight is zero.
     pub self_penetration: Tensor<B, 1>,
 }
 
-/// What a prediction is compared with.
+impl<B: Backend> LossTensors<B> {
+    /// Total, data, gradient, stretch, self-penetration: `[5]`.
+    pub(super) fn stacked(&self) -> Tensor<B, 1> {
+        let terms = [
+            &self.total,
+            &self.data,
+            &self.gradient,
+            &self.stretch,
+            &self.self_penetration,
+        ];
+        Tensor::cat(terms.map(Tensor::clone).to_vec(), 0)
+    }
+}
+
+/// The truth that a prediction is compared with.
 #[derive(Debug, Clone)]
-pub struct Target<B: Backend> {
+pub(super) struct LossTarget<B: Backend> {
     truth: Tensor<B, 4>,
     weight: Tensor<B, 4>,
     hole: Tensor<B, 4>,
     pairs_u: Tensor<B, 4>,
     pairs_v: Tensor<B, 4>,
-    /// Cells that take part in the composed grid, sample after sample.
+    /// Cells of the composed grid, sample after sample.
     present: Vec<bool>,
     /// Hole cells among them.
     open: Vec<bool>,
 }
 
-impl<B: Backend> Target<B> {
+impl<B: Backend> LossTarget<B> {
     /// The truth of a batch as tensors.
-    pub fn of(batch: Batch, device: &B::Device) -> Self {
+    pub fn of(batch: TrainingBatch, device: &B::Device) -> Self {
         let tensor = |values: Vec<f32>, shape: [usize; 4]| {
             Tensor::from_data(TensorData::new(values, shape), device)
         };
         let flags = |values: &[f32]| values.iter().map(|x| *x > 0.0).collect();
         let n = batch.count;
-        Target {
+        LossTarget {
             present: flags(&batch.weight),
             open: flags(&batch.hole),
             truth: tensor(batch.truth, [n, 3, SIDE, SIDE]),
@@ -129,9 +184,9 @@ impl<B: Backend> Target<B> {
 /// The loss of `predicted [batch, 3, 64, 64]`, in the network's units.
 pub fn loss<B: Backend>(
     predicted: Tensor<B, 4>,
-    target: &Target<B>,
+    target: &LossTarget<B>,
     weights: &LossWeights,
-) -> Loss<B> {
+) -> LossTensors<B> {
     let cells = SIDE as f32;
     let truth = target.truth.clone() * cells;
     let error = predicted * cells - truth.clone();
@@ -157,7 +212,7 @@ pub fn loss<B: Backend>(
         + gradient.clone() * weights.gradient
         + stretch.clone() * weights.stretch
         + self_penetration.clone() * weights.self_penetration;
-    Loss {
+    LossTensors {
         total,
         data,
         gradient,
@@ -193,9 +248,9 @@ fn stretch_term<B: Backend>(
     )
 }
 
-/// Repulsion of near pairs, the self-penetration term; `composed [batch, 3, 64, 64]` in cells. Which pairs there are is found without a
-/// gradient; their distances are gathered from the tensor, so that the term is differentiable.
-fn repulsion<B: Backend>(composed: Tensor<B, 4>, target: &Target<B>) -> Tensor<B, 1> {
+/// Repulsion of near pairs, the self-penetration term; `composed [batch, 3, 64, 64]` in cells. The search for pairs has no gradient; the
+/// distances are gathered from the tensor, so the term is differentiable.
+fn repulsion<B: Backend>(composed: Tensor<B, 4>, target: &LossTarget<B>) -> Tensor<B, 1> {
     let device = composed.device();
     let [batch, ..] = composed.dims();
     let cells = composed

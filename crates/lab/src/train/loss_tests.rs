@@ -1,18 +1,18 @@
-//! Laws of the loss beyond those in `tests`: the paper's form, the repulsion by hand, and its gradient against finite differences.
+//! Laws of the loss beyond those in `tests`: the paper's form, the repulsion computed by hand, and the gradient against finite differences.
 
 use burn::backend::{Autodiff, Flex};
 use burn::tensor::{Tensor, TensorData};
 
-use super::super::batch::{Batch, prepare};
+use super::super::batch::{TrainingBatch, prepare};
 use super::*;
-use crate::scarffolds::samples::Sample;
+use crate::scarffolds::samples::TrainingSample;
 use darn_geometry::grid::{cell_centre, cell_index};
 use darn_net::UnetConfig;
 
 /// A batch of one flat sheet, all of it known but the given cells.
-fn flat(hole: &[usize]) -> Batch {
+fn flat(hole: &[usize]) -> TrainingBatch {
     let open: Vec<bool> = (0..CELLS).map(|k| hole.contains(&k)).collect();
-    let sample = Sample {
+    let sample = TrainingSample {
         truth: (0..CELLS)
             .map(|k| [cell_centre(k).x as f32, cell_centre(k).y as f32, 0.0])
             .collect(),
@@ -20,11 +20,11 @@ fn flat(hole: &[usize]) -> Batch {
         known: open.iter().map(|h| !h).collect(),
         hole: open,
     };
-    Batch::of(&[prepare(&sample, &UnetConfig::default()).unwrap()])
+    TrainingBatch::of(&[prepare(&sample, &UnetConfig::default()).unwrap()])
 }
 
-/// The truth with one cell at another place, given in cells from where cell `over` is.
-fn moved(batch: &Batch, cell: usize, over: usize, by: [f32; 3]) -> Vec<f32> {
+/// The truth with one cell moved to the position of cell `over` plus an offset in cells.
+fn moved(batch: &TrainingBatch, cell: usize, over: usize, by: [f32; 3]) -> Vec<f32> {
     let mut answer = batch.truth.clone();
     for (axis, step) in by.iter().enumerate() {
         answer[axis * CELLS + cell] = batch.truth[axis * CELLS + over] + step / SIDE as f32;
@@ -45,13 +45,13 @@ fn number(x: Tensor<Flex, 1>) -> f64 {
     f64::from(x.into_scalar())
 }
 
-fn terms(answer: &[f32], batch: &Batch, weights: &LossWeights) -> Loss<Flex> {
+fn terms(answer: &[f32], batch: &TrainingBatch, weights: &LossWeights) -> LossTensors<Flex> {
     let device = Default::default();
     let predicted = Tensor::from_data(
         TensorData::new(answer.to_vec(), [1, 3, SIDE, SIDE]),
         &device,
     );
-    loss(predicted, &Target::of(batch.clone(), &device), weights)
+    loss(predicted, &LossTarget::of(batch.clone(), &device), weights)
 }
 
 #[test]
@@ -72,7 +72,7 @@ fn a_cell_over_others_repels_by_how_deep_it_is() {
     // (1 − 0.5)² over two hole cells.
     assert!((repelled - 0.125).abs() < 1e-4, "{repelled}");
     assert!((number(found.total) - number(found.data) - 3.0 * repelled).abs() < 1e-4);
-    // Without a weight it is not even computed.
+    // Without a weight it is not computed.
     let found = terms(&answer, &batch, &LossWeights::default());
     assert_eq!(number(found.self_penetration), 0.0);
 }
@@ -86,7 +86,7 @@ fn neighbours_on_the_sheet_do_not_repel() {
         number(terms(&answer, &batch, &only_repulsion()).self_penetration)
     };
     assert_eq!(onto(cell_index(21, 30)), 0.0);
-    // Over the cell four columns on, which is a stranger; that one's neighbour towards the cell is too far away to count.
+    // Over the cell four columns on, which is no neighbour. The cell three columns on is a neighbour, and the others are too far away.
     assert!((onto(cell_index(24, 30)) - 0.81).abs() < 2e-3);
 }
 
@@ -126,7 +126,12 @@ fn the_gradient_is_what_finite_differences_give() {
             &device,
         )
         .require_grad();
-        let total = loss(input.clone(), &Target::of(batch.clone(), &device), &weights).total;
+        let total = loss(
+            input.clone(),
+            &LossTarget::of(batch.clone(), &device),
+            &weights,
+        )
+        .total;
         let gradients = total.backward();
         let gradient: Vec<f32> = input
             .grad(&gradients)

@@ -1,6 +1,6 @@
-//! AdamW (Loshchilov & Hutter 2019) over a module's parameters in their own order, with one clip of the whole gradient's norm, and
-//! an exponential average of the weights. burn's own clips each tensor by itself and keys its state by ids that a checkpoint would
-//! have to carry.
+//! AdamW (Loshchilov & Hutter 2019) over the parameters of a module in their order, with the norm of the whole gradient clipped, and an
+//! exponential average of the weights. burn's AdamW is not used: it clips each tensor separately, and it stores its state by parameter ids,
+//! which a checkpoint would have to contain.
 
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -10,23 +10,26 @@ use burn::optim::GradientsParams;
 use burn::tensor::Tensor;
 use burn::tensor::backend::{AutodiffBackend, Backend};
 
+/// Decay of the first moment.
 pub const BETA1: f64 = 0.9;
+/// Decay of the second moment.
 pub const BETA2: f64 = 0.99;
+/// Keeps the division by the second moment finite.
 pub const EPSILON: f64 = 1e-8;
-/// Decay of kernels; vectors do not decay.
+/// Weight decay of kernels; vectors do not decay.
 pub const DECAY: f64 = 1e-2;
 /// Largest norm of the whole gradient.
 pub const CLIP: f64 = 1.0;
-/// The average's memory never exceeds this many steps' share.
+/// Largest share that the average keeps of itself at a step.
 const AVERAGE: f64 = 0.998;
 
-/// The optimiser's state. All trained parameters lie end to end in one tensor, in the module's order: on a GPU a step is a few large
-/// kernels instead of a thousand small ones.
+/// The state of the optimiser. All trained parameters are concatenated to one tensor in the module's order, so that a step on a GPU is a few
+/// large kernels instead of a thousand small ones.
 #[derive(Debug, Clone)]
 pub struct AdamW<B: Backend> {
     /// Steps taken.
     pub step: u64,
-    /// First and second moment, once there is a step.
+    /// First and second moments; `None` before the first step.
     pub moments: Option<[Tensor<B, 1>; 2]>,
 }
 
@@ -40,7 +43,8 @@ impl<B: Backend> Default for AdamW<B> {
 }
 
 impl<I: Backend> AdamW<I> {
-    /// One step down the gradients; returns the module and the gradient's norm before clipping, `[1]`, which nothing has waited for.
+    /// One step down the gradients; returns the module, and the norm of the gradient before clipping as a tensor `[1]`, so that the step does
+    /// not wait for the device.
     pub fn step<B, M>(
         &mut self,
         module: M,
@@ -52,7 +56,7 @@ impl<I: Backend> AdamW<I> {
         M: Module<B>,
     {
         self.step += 1;
-        let mut trained = Trained::<I> {
+        let mut trained = TrainedParameters::<I> {
             gradients,
             decay: 1.0 - rate * DECAY,
             places: VecDeque::new(),
@@ -73,7 +77,7 @@ impl<I: Backend> AdamW<I> {
         let (scale1, scale2) = (unbias(BETA1) * rate, unbias(BETA2));
         let change = (first.clone() * scale1).div((second.clone() * scale2).sqrt() + EPSILON);
         self.moments = Some([first, second]);
-        let mut update = Update {
+        let mut update = ParameterUpdate {
             values: values - change,
             places: trained.places,
         };
@@ -81,17 +85,17 @@ impl<I: Backend> AdamW<I> {
     }
 }
 
-/// The parameters that have a gradient, decayed, and their gradients.
-struct Trained<'a, I: Backend> {
+/// Collects the decayed parameters that have a gradient, and their gradients.
+struct TrainedParameters<'a, I: Backend> {
     gradients: &'a GradientsParams,
-    /// What is left of a kernel; vectors are left as they are.
+    /// Factor that kernels shrink by; vectors keep their values.
     decay: f64,
     places: VecDeque<(ParamId, Range<usize>)>,
     values: Vec<Tensor<I, 1>>,
     slopes: Vec<Tensor<I, 1>>,
 }
 
-impl<B: AutodiffBackend> ModuleVisitor<B> for Trained<'_, B::InnerBackend> {
+impl<B: AutodiffBackend> ModuleVisitor<B> for TrainedParameters<'_, B::InnerBackend> {
     fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<B, D>>) {
         let Some(slope) = self.gradients.get::<B::InnerBackend, D>(param.id) else {
             return;
@@ -107,13 +111,13 @@ impl<B: AutodiffBackend> ModuleVisitor<B> for Trained<'_, B::InnerBackend> {
     }
 }
 
-/// Puts values end to end back to where they belong.
-struct Update<I: Backend> {
+/// Writes concatenated values back into their parameters.
+struct ParameterUpdate<I: Backend> {
     values: Tensor<I, 1>,
     places: VecDeque<(ParamId, Range<usize>)>,
 }
 
-impl<B: AutodiffBackend> ModuleMapper<B> for Update<B::InnerBackend> {
+impl<B: AutodiffBackend> ModuleMapper<B> for ParameterUpdate<B::InnerBackend> {
     fn map_float<const D: usize>(&mut self, param: Param<Tensor<B, D>>) -> Param<Tensor<B, D>> {
         let (id, tensor, mapper) = param.consume();
         match self.places.pop_front_if(|(first, _)| *first == id) {
@@ -127,24 +131,24 @@ impl<B: AutodiffBackend> ModuleMapper<B> for Update<B::InnerBackend> {
     }
 }
 
-/// What the average keeps of itself at a step, which counts from 1.
+/// The share that the average keeps of itself at a step; steps count from 1.
 pub fn share_kept(step: u64) -> f64 {
     AVERAGE.min((1.0 + step as f64) / (10.0 + step as f64))
 }
 
-/// All values of a module end to end, running statistics included.
+/// All values of a module concatenated, with the running statistics.
 pub fn flat<B: Backend, M: Module<B>>(module: &M) -> Tensor<B, 1> {
-    let mut collect = Collect { values: Vec::new() };
+    let mut collect = ValueCollector { values: Vec::new() };
     module.visit(&mut collect);
     Tensor::cat(collect.values, 0)
 }
 
 /// The module with the values of [`flat`].
 pub fn with_values<B: Backend, M: Module<B>>(module: M, values: Tensor<B, 1>) -> M {
-    module.map(&mut Place { values, next: 0 })
+    module.map(&mut ValuePlacer { values, next: 0 })
 }
 
-/// The average of a module's [`flat`] values moved towards the current ones; `step` counts from 1.
+/// The average of [`flat`] values, moved towards the current ones; `step` counts from 1.
 pub fn average<B: Backend>(
     averaged: Tensor<B, 1>,
     current: Tensor<B, 1>,
@@ -154,11 +158,12 @@ pub fn average<B: Backend>(
     averaged * keep + current * (1.0 - keep)
 }
 
-struct Collect<B: Backend> {
+/// Collects all values of a module.
+struct ValueCollector<B: Backend> {
     values: Vec<Tensor<B, 1>>,
 }
 
-impl<B: Backend> ModuleVisitor<B> for Collect<B> {
+impl<B: Backend> ModuleVisitor<B> for ValueCollector<B> {
     fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<B, D>>) {
         let value = param.val();
         let n = value.shape().num_elements();
@@ -166,12 +171,13 @@ impl<B: Backend> ModuleVisitor<B> for Collect<B> {
     }
 }
 
-struct Place<B: Backend> {
+/// Replaces all values of a module.
+struct ValuePlacer<B: Backend> {
     values: Tensor<B, 1>,
     next: usize,
 }
 
-impl<B: Backend> ModuleMapper<B> for Place<B> {
+impl<B: Backend> ModuleMapper<B> for ValuePlacer<B> {
     fn map_float<const D: usize>(&mut self, param: Param<Tensor<B, D>>) -> Param<Tensor<B, D>> {
         let (id, tensor, mapper) = param.consume();
         let shape = tensor.shape();

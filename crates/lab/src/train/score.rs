@@ -1,9 +1,10 @@
-//! Held-out scores: how far predicted hole cells are from the truth, in position, direction and amount of cloth.
+//! Held-out scores: the error of predicted hole cells in position, direction and amount of cloth.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::batch::Prepared;
+use super::batch::PreparedSample;
+use crate::cell_normals::normal;
 use darn_geometry::grid::{CELLS, SIDE, neighbour_pairs};
 
 /// Means over samples; positions in cells, angles in degrees.
@@ -21,8 +22,17 @@ pub struct Score {
     pub area: f64,
 }
 
-/// Scores predictions of every cell against prepared samples; known cells are taken from the samples.
-pub fn score(samples: &[Prepared], predictions: &[Vec<[f32; 3]>]) -> Score {
+/// The scores of a network and of its input fill on the same samples.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct HeldOutScores {
+    /// The network's.
+    pub network: Score,
+    /// The input fill's.
+    pub fill: Score,
+}
+
+/// Scores predictions `[cell]` of prepared samples; known cells are taken from the samples.
+pub(super) fn score(samples: &[PreparedSample], predictions: &[Vec<[f32; 3]>]) -> Score {
     let each: Vec<Score> = samples
         .iter()
         .zip(predictions)
@@ -40,7 +50,7 @@ pub fn score(samples: &[Prepared], predictions: &[Vec<[f32; 3]>]) -> Score {
     }
 }
 
-fn one(sample: &Prepared, predicted: &[[f32; 3]]) -> Score {
+fn one(sample: &PreparedSample, predicted: &[[f32; 3]]) -> Score {
     let hole = |k: usize| sample.hole[k];
     let truth: Vec<Vector3<f64>> = sample.truth.iter().map(vector).collect();
     let answer: Vec<Vector3<f64>> = (0..CELLS)
@@ -85,20 +95,6 @@ fn one(sample: &Prepared, predicted: &[[f32; 3]]) -> Score {
         spacing: length(&answer) / length(&truth).max(1e-12),
         area: areas.0 / areas.1.max(1e-12),
     }
-}
-
-/// Cross product of central differences; `None` at the border and where a neighbour has no truth.
-fn normal(x: &[Vector3<f64>], valid: &[bool], k: usize) -> Option<Vector3<f64>> {
-    let (i, j) = (k % SIDE, k / SIDE);
-    if i == 0
-        || j == 0
-        || i + 1 == SIDE
-        || j + 1 == SIDE
-        || ![k - 1, k + 1, k - SIDE, k + SIDE].iter().all(|n| valid[*n])
-    {
-        return None;
-    }
-    Some((x[k + 1] - x[k - 1]).cross(&(x[k + SIDE] - x[k - SIDE])))
 }
 
 fn vector(p: &[f32; 3]) -> Vector3<f64> {

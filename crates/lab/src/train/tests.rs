@@ -1,4 +1,4 @@
-//! Laws of training, on small cylinders: hand-computed losses, repeatable batches, a state that survives its file, a loss that falls.
+//! Laws of training, on small cylinders: losses computed by hand, repeatable batches, checkpoints without loss, a loss that falls.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -8,15 +8,18 @@ use burn::tensor::{Tensor, TensorData};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::batch::{Ahead, Batch, Recipe, augment, prepare};
-use super::loss::{Target, loss};
+use super::batch::{BatchGenerator, BatchPrefetcher, TrainingBatch, augment, prepare};
+use super::loss::{LossTarget, loss};
 use super::score::score;
+use super::snapshot::TrainSnapshot;
+use super::trainer::Trainer;
 use super::*;
+use crate::scarffolds::samples::TrainingSample;
 use crate::unet::{BackendKind, load_network};
 use darn_geometry::grid::{CELLS, SIDE, cell_centre, cell_index};
-use darn_net::{FrameKind, InputKind};
+use darn_net::{FrameKind, InputKind, UnetConfig};
 
-type B = Burned<Autodiff<Flex>>;
+type B = BurnTrainer<Autodiff<Flex>>;
 
 fn config(frame: FrameKind) -> UnetConfig {
     UnetConfig {
@@ -26,7 +29,7 @@ fn config(frame: FrameKind) -> UnetConfig {
 }
 
 /// A cylinder of random radius with a square hole.
-fn cylinder(rng: &mut ChaCha8Rng) -> Sample {
+fn cylinder(rng: &mut ChaCha8Rng) -> TrainingSample {
     let bend = rng.random_range(1.0..5.0f64);
     let size = rng.random_range(4..12usize);
     let truth = (0..CELLS)
@@ -39,7 +42,7 @@ fn cylinder(rng: &mut ChaCha8Rng) -> Sample {
     let hole: Vec<bool> = (0..CELLS)
         .map(|k| (k % SIDE).abs_diff(30) < size && (k / SIDE).abs_diff(34) < size)
         .collect();
-    Sample {
+    TrainingSample {
         truth,
         valid: vec![true; CELLS],
         known: hole.iter().map(|h| !h).collect(),
@@ -47,7 +50,7 @@ fn cylinder(rng: &mut ChaCha8Rng) -> Sample {
     }
 }
 
-fn cylinders(rng: &mut ChaCha8Rng) -> Vec<Sample> {
+fn cylinders(rng: &mut ChaCha8Rng) -> Vec<TrainingSample> {
     vec![cylinder(rng)]
 }
 
@@ -65,9 +68,9 @@ fn options(out: &Path) -> TrainOptions {
     }
 }
 
-fn sources() -> Sources {
+fn data() -> TrainingData {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
-    Sources {
+    TrainingData {
         train: Arc::new(cylinders),
         held_out: (0..3).map(|_| cylinder(&mut rng)).collect(),
         data_seed: Some(11),
@@ -75,22 +78,22 @@ fn sources() -> Sources {
 }
 
 /// A batch of one flat sheet, all of it known but the given cells.
-fn flat(hole: &[usize]) -> Batch {
+fn flat(hole: &[usize]) -> TrainingBatch {
     let truth = (0..CELLS)
         .map(|k| [cell_centre(k).x as f32, cell_centre(k).y as f32, 0.0])
         .collect();
     let hole: Vec<bool> = (0..CELLS).map(|k| hole.contains(&k)).collect();
-    let sample = Sample {
+    let sample = TrainingSample {
         truth,
         valid: vec![true; CELLS],
         known: hole.iter().map(|h| !h).collect(),
         hole,
     };
-    Batch::of(&[prepare(&sample, &config(FrameKind::Given)).unwrap()])
+    TrainingBatch::of(&[prepare(&sample, &config(FrameKind::Given)).unwrap()])
 }
 
 #[test]
-fn the_loss_is_what_one_computes_by_hand() {
+fn the_loss_is_the_one_computed_by_hand() {
     let cell = cell_index(20, 30);
     let batch = flat(&[cell]);
     let device = Default::default();
@@ -102,7 +105,7 @@ fn the_loss_is_what_one_computes_by_hand() {
         Tensor::<Flex, 4>::from_data(TensorData::new(answer, [1, 3, SIDE, SIDE]), &device);
     let terms = loss(
         predicted,
-        &Target::of(batch, &device),
+        &LossTarget::of(batch, &device),
         &LossWeights {
             gradient: 2.0,
             stretch: 3.0,
@@ -133,15 +136,19 @@ fn the_loss_is_what_one_computes_by_hand() {
 fn the_truth_has_no_loss_and_perfect_scores() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let sample = prepare(&cylinder(&mut rng), &config(FrameKind::Canonical)).unwrap();
-    let batch = Batch::of(std::slice::from_ref(&sample));
+    let batch = TrainingBatch::of(std::slice::from_ref(&sample));
     let device = Default::default();
     let truth = Tensor::<Flex, 4>::from_data(
         TensorData::new(batch.truth.clone(), [1, 3, SIDE, SIDE]),
         &device,
     );
-    let total = loss(truth, &Target::of(batch, &device), &LossWeights::default())
-        .total
-        .into_scalar();
+    let total = loss(
+        truth,
+        &LossTarget::of(batch, &device),
+        &LossWeights::default(),
+    )
+    .total
+    .into_scalar();
     assert!(total.abs() < 1e-5, "{total}");
     let perfect = score(
         std::slice::from_ref(&sample),
@@ -189,15 +196,15 @@ fn prepared_samples_are_in_the_networks_units() {
 
 #[test]
 fn batches_depend_on_seed_and_index_alone() {
-    let recipe = Recipe {
+    let generator = BatchGenerator {
         source: Arc::new(cylinders),
         network: config(FrameKind::Canonical),
         size: 2,
         seed: 3,
     };
-    let expected: Vec<Vec<f32>> = (4..8).map(|k| recipe.batch(k).positions).collect();
+    let expected: Vec<Vec<f32>> = (4..8).map(|k| generator.batch(k).positions).collect();
     for threads in [1, 3] {
-        let mut ahead = Ahead::start(&recipe, 4, threads);
+        let mut ahead = BatchPrefetcher::start(&generator, 4, threads);
         for positions in &expected {
             assert_eq!(ahead.next_batch().unwrap().positions, *positions);
         }
@@ -206,12 +213,12 @@ fn batches_depend_on_seed_and_index_alone() {
 }
 
 #[test]
-fn training_learns_resumes_and_ships_what_loads() {
+fn training_learns_resumes_and_exports_weights_that_load() {
     let dir = tempfile::tempdir().unwrap();
     let mut options = options(dir.path());
     let mut losses = Vec::new();
     let summary =
-        trainer::train::<B>(&options, sources(), &mut |p| losses.push(p.loss[0])).unwrap();
+        training_loop::train::<B>(&options, data(), &mut |p| losses.push(p.loss.total)).unwrap();
     assert!(summary.steps > 0 && summary.weights.exists());
     let network =
         load_network(&std::fs::read(&summary.weights).unwrap(), BackendKind::Flex).unwrap();
@@ -237,13 +244,13 @@ fn training_learns_resumes_and_ships_what_loads() {
         "a checkpoint that is read and written again is the same"
     );
 
-    options.resume = Start::Resume;
+    options.resume = RunStart::Resume;
     options.minutes = 0.08;
-    let further = trainer::train::<B>(&options, sources(), &mut |_| {}).unwrap();
+    let further = training_loop::train::<B>(&options, data(), &mut |_| {}).unwrap();
     assert!(further.steps > summary.steps);
     options.seed = 99;
     assert!(matches!(
-        trainer::train::<B>(&options, sources(), &mut |_| {}),
+        training_loop::train::<B>(&options, data(), &mut |_| {}),
         Err(TrainError::Checkpoint { .. })
     ));
 }
@@ -252,7 +259,7 @@ fn training_learns_resumes_and_ships_what_loads() {
 fn a_checkpoint_that_is_read_and_written_again_is_the_same() {
     let dir = tempfile::tempdir().unwrap();
     let options = options(dir.path());
-    let empty = student::Snapshot {
+    let empty = TrainSnapshot {
         network: Default::default(),
         averaged: Default::default(),
         moments: Vec::new(),
@@ -275,22 +282,22 @@ fn a_checkpoint_that_is_read_and_written_again_is_the_same() {
 }
 
 #[test]
-fn the_engine_goes_on_from_what_burn_has_learned() {
+fn the_engine_continues_from_weights_that_burn_has_trained() {
     let (dir, further) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    let first = trainer::train::<B>(&options(dir.path()), sources(), &mut |_| {}).unwrap();
+    let first = training_loop::train::<B>(&options(dir.path()), data(), &mut |_| {}).unwrap();
     let mut options = TrainOptions {
         from: Some(first.weights),
-        trainer: Trainer::Engine,
+        trainer: TrainerKind::Engine,
         ..options(further.path())
     };
-    // It may learn where up is from weights that do not know.
+    // A network that is told the up direction may start from weights of one that is not.
     options.network.frame = FrameKind::Hanging;
-    let second = trainer::train::<Engined>(&options, sources(), &mut |_| {}).unwrap();
+    let second = training_loop::train::<EngineTrainer>(&options, data(), &mut |_| {}).unwrap();
     assert!(second.steps > 0 && second.weights.exists());
     let (snapshot, _) = checkpoint::load(&options, further.path()).unwrap();
     let flex = B::of(snapshot.clone(), &options).unwrap();
-    let engine = Engined::of(snapshot, &options).unwrap();
-    let held: Vec<_> = (sources().held_out.iter())
+    let engine = EngineTrainer::of(snapshot, &options).unwrap();
+    let held: Vec<_> = (data().held_out.iter())
         .filter_map(|sample| prepare(sample, &options.network))
         .collect();
     let answers = [flex.predictions(&held), engine.predictions(&held)].map(Result::unwrap);
@@ -299,7 +306,7 @@ fn the_engine_goes_on_from_what_burn_has_learned() {
     }
     options.from = None;
     assert!(matches!(
-        trainer::train::<Engined>(&options, sources(), &mut |_| {}),
+        training_loop::train::<EngineTrainer>(&options, data(), &mut |_| {}),
         Err(TrainError::Options(_))
     ));
 }
@@ -308,16 +315,22 @@ fn the_engine_goes_on_from_what_burn_has_learned() {
 fn the_engine_learns_a_batch() {
     let dir = tempfile::tempdir().unwrap();
     let mut options = options(dir.path());
-    let fresh = Snapshot::fresh(&options).unwrap();
+    let fresh = TrainSnapshot::fresh(&options).unwrap();
     options.from = Some(dir.path().to_owned());
-    let mut student = Engined::of(fresh, &options).unwrap();
-    let recipe = Recipe {
+    let mut trainer = EngineTrainer::of(fresh, &options).unwrap();
+    let generator = BatchGenerator {
         source: Arc::new(cylinders),
         network: options.network,
         size: 6,
         seed: 3,
     };
-    let mut learn = || student.step(recipe.batch(0), &options, 2e-3).unwrap().0[0];
+    let mut learn = || {
+        trainer
+            .step(generator.batch(0), &options, 2e-3)
+            .unwrap()
+            .loss
+            .total
+    };
     let before = learn();
     let after = (0..80).map(|_| learn()).fold(f32::NAN, |_, loss| loss);
     assert!(after < 0.95 * before, "{before} {after}");
@@ -337,7 +350,7 @@ fn bad_options_are_refused_before_work() {
         },
     ] {
         assert!(matches!(
-            trainer::train::<B>(&bad, sources(), &mut |_| {}),
+            training_loop::train::<B>(&bad, data(), &mut |_| {}),
             Err(TrainError::Options(_))
         ));
     }
@@ -349,5 +362,5 @@ fn bad_options_are_refused_before_work() {
         },
         ..options(dir.path())
     };
-    trainer::train::<B>(&zeros, sources(), &mut |_| {}).unwrap();
+    training_loop::train::<B>(&zeros, data(), &mut |_| {}).unwrap();
 }

@@ -1,4 +1,4 @@
-//! The anchor search's loss by burn's autodiff, which leads through the Gaussian, the mask, the membrane and the network; see
+//! The loss of the anchor search and its gradient by burn's autodiff, through the Gaussian, the mask, the membrane and the network; see
 //! [`darn_net::AnchorProblem`] for the formula.
 
 use burn::backend::Autodiff;
@@ -8,9 +8,9 @@ use burn::tensor::{Tensor, TensorData, backend::Backend};
 use darn_geometry::grid::{CELLS, SIDE};
 use darn_net::{AnchorLoss, AnchorProblem, NetError, SIGMA, UnetConfig};
 
-use super::{Convolve, Sight, Unet};
+use super::{Convolve, InputTensors, Unet};
 
-/// A grid with its target as tensors, in the network's frame.
+/// A grid with its target, in the network's frame.
 struct ProblemTensors<B: Backend> {
     /// The scan's positions where known, the target elsewhere: `[1, 3, 64, 64]`.
     positions: Tensor<B, 4>,
@@ -41,7 +41,7 @@ impl<B: Backend> ProblemTensors<B> {
         }
     }
 
-    /// L at places `at [n, 2]`, in cells: `[n]`.
+    /// L at positions `at [n, 2]`, in cells: `[n]`.
     fn losses(&self, unet: &Unet<B>, config: &UnetConfig, at: Tensor<B, 2>) -> Tensor<B, 1>
     where
         B: Convolve,
@@ -52,13 +52,13 @@ impl<B: Backend> ProblemTensors<B> {
         let bell = along_v.matmul(along_u).reshape([n, 1, SIDE, SIDE]);
         let known = self.known.clone().repeat_dim(0, n);
         let soft = known.clone() + bell.clone() * (known.neg() + 1.0);
-        let sight = Sight {
+        let input = InputTensors {
             positions: self.positions.clone().repeat_dim(0, n),
             known: soft,
             base: self.base.clone().map(|base| base.repeat_dim(0, n)),
             up: self.up.clone().map(|up| up.repeat_dim(0, n)),
         };
-        let answer = unet.predict(config.input, sight);
+        let answer = unet.predict(config.input, input);
         let weight = bell.reshape([n, 1, CELLS]);
         let total = weight.clone().sum_dim(2);
         let read = (answer.reshape([n, 3, CELLS]) * weight.repeat_dim(1, 3)).sum_dim(2);
@@ -77,8 +77,8 @@ fn bell<B: Backend>(at: Tensor<B, 2>) -> Tensor<B, 2> {
     (off.clone().mul(off) * (-0.5 / (SIGMA * SIGMA))).exp()
 }
 
-/// Places `[n, 2]` in cells, the centre of cell (i, j) at (i, j), from uvs.
-fn places<B: Backend>(uvs: &[[f32; 2]]) -> Tensor<B, 2> {
+/// Positions `[n, 2]` in cells, with the centre of cell (i, j) at (i, j), from uvs.
+fn positions_in_cells<B: Backend>(uvs: &[[f32; 2]]) -> Tensor<B, 2> {
     let cells = uvs.iter().flatten().map(|x| x * SIDE as f32 - 0.5);
     Tensor::from_data(
         TensorData::new(cells.collect::<Vec<f32>>(), [uvs.len(), 2]),
@@ -104,10 +104,10 @@ pub fn losses<B: Convolve>(
     uvs: &[[f32; 2]],
 ) -> Result<Vec<f32>, NetError> {
     let tensors = ProblemTensors::<B>::of(problem);
-    numbers(tensors.losses(unet, config, places(uvs)))
+    numbers(tensors.losses(unet, config, positions_in_cells(uvs)))
 }
 
-/// L at uvs and its gradient. The network's parameters are frozen, so that nothing is spent on theirs.
+/// L at uvs and its gradient. The parameters of the network are frozen, so that their gradients are not computed.
 pub fn gradients<B>(
     unet: &Unet<B>,
     config: &UnetConfig,
@@ -120,7 +120,7 @@ where
 {
     let unet: Unet<Autodiff<B>> = unet.clone().train().no_grad();
     let tensors = ProblemTensors::<Autodiff<B>>::of(problem);
-    let at = places::<Autodiff<B>>(uvs).require_grad();
+    let at = positions_in_cells::<Autodiff<B>>(uvs).require_grad();
     let losses = tensors.losses(&unet, config, at.clone());
     let gradients = losses.clone().sum().backward();
     let slopes = match at.grad(&gradients) {

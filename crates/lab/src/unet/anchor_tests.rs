@@ -1,4 +1,5 @@
-//! Laws of the anchor search's loss: its gradient is its slope, by burn's autodiff and by the engine, and an anchor on the plate is no news.
+//! Laws of the anchor search's loss: its gradient is that of finite differences in f64, in burn and in the engine, and an anchor on the plate
+//! changes nothing.
 
 use super::tests::{CONFIG, bent, card, disk, filled, largest_distance, silent, tensors};
 use super::*;
@@ -42,14 +43,14 @@ fn plain_loss(tensors: &NamedTensors, grid: &NormalGrid, target: [f32; 3], at: [
 }
 
 #[test]
-fn the_anchor_loss_falls_as_its_gradient_says() {
+fn the_gradient_of_the_anchor_loss_is_that_of_finite_differences() {
     let config = UnetConfig {
         frame: FrameKind::Given,
         ..CONFIG
     };
     let tensors = tensors(config);
     let bytes = write(&tensors, &card(config)).unwrap();
-    // What is on disk is rounded.
+    // The tensors in the file are rounded.
     let tensors = read(&write(&tensors, &card(config)).unwrap()).unwrap().1;
     let grid = bent(disk);
     let target = [0.05, 0.1, 0.2];
@@ -95,15 +96,15 @@ fn the_engines_gradient_is_that_of_burns_autodiff() {
         let bytes = write(&tensors(config), &card(config)).unwrap();
         let grid = bent(disk);
         let uvs = [[0.5, 0.5], [0.45, 0.56], [0.52, 0.41]];
-        let by = |settings: Settings| {
+        let by = |settings: BackendSettings| {
             let network = load_network(&bytes, settings).unwrap();
             let problem = network.anchor_problem(&grid, [0.02, 0.1, 0.25], None);
             network.anchor_gradients(&problem.unwrap(), &uvs).unwrap()
         };
         let own = by(BackendKind::Engine.into());
-        let burn = by(Settings {
+        let burn = by(BackendSettings {
             autodiff: Some(BackendKind::Flex),
-            ..Settings::default()
+            ..BackendSettings::default()
         });
         for (own, burn) in own.iter().zip(&burn) {
             let size = 1.0 + burn.gradient[0].hypot(burn.gradient[1]);
@@ -116,7 +117,7 @@ fn the_engines_gradient_is_that_of_burns_autodiff() {
 }
 
 #[test]
-fn an_anchor_on_the_plate_moves_no_cell_of_what_the_network_sees() {
+fn an_anchor_on_the_plate_moves_no_cell_of_the_input_fill() {
     let config = UnetConfig {
         input: InputKind::Plate,
         ..CONFIG

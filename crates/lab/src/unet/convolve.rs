@@ -1,8 +1,8 @@
-//! Convolutions: 3×3 with one cell of zero padding, and 1×1. The kernels are burn's own on every backend but flex.
+//! Convolutions: 3×3 with one cell of zero padding, and 1×1. All backends but flex use burn's kernels.
 //!
-//! On flex the 3×3 kernel lays out shifted rows (im2col) and leaves the rest to the backend's matrix product, forward and backward.
-//! burn-flex 0.21 spends most of a training step at width 16 on re-laying-out tensors element by element. With this and [`super::norm`],
-//! 16 samples take 0.55 s of one thread instead of 1.3, and an answer for one grid 9 ms instead of 20.
+//! On flex the 3×3 convolution is a matrix product over shifted rows (im2col), forward and backward. burn-flex 0.21 spends most of a training
+//! step at width 16 on rearranging tensors element by element. With this file and [`super::norm`], a step of 16 samples takes 0.55 s of one
+//! thread instead of 1.3 s, and a prediction for one grid 9 ms instead of 20 ms.
 
 use burn::backend::Flex;
 use burn::backend::NdArray;
@@ -18,12 +18,12 @@ use burn::tensor::ops::{ConvOptions, FloatTensor, FloatTensorOps};
 use burn::tensor::{Tensor, TensorData, TensorMetadata, TensorPrimitive};
 use rayon::prelude::*;
 
-/// Places of a 3×3 kernel.
+/// Cells of a 3×3 kernel.
 const TAPS: usize = 9;
-/// Fewest cells that one matrix product covers, where there are that many; small images go together.
+/// Small images share a matrix product of at least this many cells.
 const CELLS_TOGETHER: usize = 1024;
 
-/// A backend with a 3×3 convolution of its own; the defaults are burn's.
+/// A backend's 3×3 convolution; the defaults are burn's.
 pub trait Convolve: Backend {
     /// `[batch, from, h, w]` and kernel `[to, from, 3, 3] -> [batch, to, h, w]`; zeros beyond the border.
     fn convolve(x: FloatTensor<Self>, kernel: FloatTensor<Self>) -> FloatTensor<Self> {
@@ -63,7 +63,7 @@ impl Convolve for burn::backend::Cuda {}
 
 impl Convolve for Flex {
     fn convolve(x: FlexTensor, kernel: FlexTensor) -> FlexTensor {
-        let (images, kernel) = (Images::of(x), kernel.to_contiguous());
+        let (images, kernel) = (ImageBatch::of(x), kernel.to_contiguous());
         let [to, from, ..] = kernel.shape().dims::<4>();
         let matrix = kernel.reshape([to, from * TAPS].into());
         images.map_groups(to, |columns| Flex::float_matmul(matrix.clone(), columns))
@@ -71,8 +71,9 @@ impl Convolve for Flex {
 
     fn convolve_backward_x(_: FlexTensor, kernel: FlexTensor, gradient: FlexTensor) -> FlexTensor {
         let from = kernel.shape().dims::<4>()[1];
-        let turned = turned(&kernel.to_contiguous());
-        Images::of(gradient).map_groups(from, |columns| Flex::float_matmul(turned.clone(), columns))
+        let rotated = rotated(&kernel.to_contiguous());
+        ImageBatch::of(gradient)
+            .map_groups(from, |columns| Flex::float_matmul(rotated.clone(), columns))
     }
 
     fn convolve_backward(
@@ -80,11 +81,11 @@ impl Convolve for Flex {
         kernel: FlexTensor,
         gradient: FlexTensor,
     ) -> [FlexTensor; 2] {
-        let (images, gradients) = (Images::of(x), Images::of(gradient));
+        let (images, gradients) = (ImageBatch::of(x), ImageBatch::of(gradient));
         let [to, from, ..] = kernel.shape().dims::<4>();
         let kernel = kernel.to_contiguous();
         let weights: &[f32] = kernel.storage();
-        let turned = turned(&kernel);
+        let rotated = rotated(&kernel);
         let groups: Vec<(FlexTensor, FlexTensor)> = gradients
             .groups()
             .into_par_iter()
@@ -92,10 +93,10 @@ impl Convolve for Flex {
                 let columns = gradients.columns(&group);
                 let inputs = images.side_by_side(&group);
                 let for_kernel = Flex::float_matmul(inputs, columns.transpose(0, 1));
-                (Flex::float_matmul(turned.clone(), columns), for_kernel)
+                (Flex::float_matmul(rotated.clone(), columns), for_kernel)
             })
             .collect();
-        // Summed in the order of the images, whoever finished first.
+        // Summed in the order of the images, so that the result does not depend on the threads.
         let mut sums = vec![0.0; weights.len()];
         let mut inputs = Vec::with_capacity(groups.len());
         for (for_input, for_kernel) in groups {
@@ -113,19 +114,19 @@ impl Convolve for Flex {
     }
 }
 
-/// A contiguous kernel turned by half a turn, its channels swapped: `[to, from, 3, 3] -> [from, to · 9]`. The gradient of a convolution's
-/// input is the convolution of the result's gradient with it.
-fn turned(kernel: &FlexTensor) -> FlexTensor {
+/// A contiguous kernel rotated by half a turn, its channels swapped: `[to, from, 3, 3] -> [from, to · 9]`. The gradient with respect to the
+/// input of a convolution is the convolution of the result's gradient with this kernel.
+fn rotated(kernel: &FlexTensor) -> FlexTensor {
     let [to, from, ..] = kernel.shape().dims::<4>();
     let weights: &[f32] = kernel.storage();
-    let mut turned = vec![0.0; weights.len()];
+    let mut rotated = vec![0.0; weights.len()];
     each_tap(to, from, |straight, swapped| {
-        turned[swapped] = weights[straight]
+        rotated[swapped] = weights[straight]
     });
-    flex(turned, [from, to * TAPS])
+    flex(rotated, [from, to * TAPS])
 }
 
-/// Index of every weight in `[to, from, 3, 3]`, and in `[from, to, 3, 3]` with the kernel turned by half a turn.
+/// Calls `visit` with the index of every weight in `[to, from, 3, 3]`, and in `[from, to, 3, 3]` with the kernel rotated by half a turn.
 fn each_tap(to: usize, from: usize, mut visit: impl FnMut(usize, usize)) {
     for target in 0..to {
         for source in 0..from {
@@ -144,7 +145,7 @@ fn flex<const D: usize>(values: Vec<f32>, shape: [usize; D]) -> FlexTensor {
 }
 
 /// A contiguous batch of images.
-struct Images {
+struct ImageBatch {
     tensor: FlexTensor,
     count: usize,
     channels: usize,
@@ -152,10 +153,10 @@ struct Images {
     width: usize,
 }
 
-impl Images {
+impl ImageBatch {
     fn of(x: FlexTensor) -> Self {
         let [count, channels, height, width] = x.shape().dims::<4>();
-        Images {
+        ImageBatch {
             tensor: x.to_contiguous(),
             count,
             channels,
@@ -168,7 +169,7 @@ impl Images {
         self.height * self.width
     }
 
-    /// Runs of images that go into one product.
+    /// Ranges of images that share a product.
     fn groups(&self) -> Vec<std::ops::Range<usize>> {
         let together = CELLS_TOGETHER.div_ceil(self.cells().max(1));
         (0..self.count)
@@ -183,7 +184,7 @@ impl Images {
         &self.tensor.storage::<f32>()[start..start + self.cells()]
     }
 
-    /// The images of a group beside each other: `[channels, images · cells]`.
+    /// The images of a group, side by side: `[channels, images · cells]`.
     fn side_by_side(&self, group: &std::ops::Range<usize>) -> FlexTensor {
         let mut values = Vec::with_capacity(group.len() * self.channels * self.cells());
         for channel in 0..self.channels {
@@ -205,7 +206,8 @@ impl Images {
                         &mut values,
                         self.plane(image, channel),
                         self.width,
-                        [tap % 3, tap / 3],
+                        tap % 3,
+                        tap / 3,
                     );
                 }
             }
@@ -227,7 +229,7 @@ impl Images {
         self.join(to, &results)
     }
 
-    /// From `[channels, images · cells]` a group to `[count, channels, height, width]`.
+    /// From `[channels, images · cells]` for each group to `[count, channels, height, width]`.
     fn join(&self, channels: usize, groups: &[FlexTensor]) -> FlexTensor {
         let cells = self.cells();
         let mut values = Vec::with_capacity(self.count * channels * cells);
@@ -249,7 +251,8 @@ fn push_shifted(
     values: &mut Vec<f32>,
     plane: &[f32],
     width: usize,
-    [shift_x, shift_y]: [usize; 2],
+    shift_x: usize,
+    shift_y: usize,
 ) {
     let height = plane.len() / width;
     for y in 0..height {
@@ -331,36 +334,36 @@ impl<B: Convolve, C: CheckpointStrategy> Convolve for Autodiff<B, C> {
 
 /// A convolution that keeps the grid's size: kernel `[to, from, k, k]` with k = 3 or 1.
 #[derive(Module, Debug)]
-pub struct Conv<B: Backend> {
+pub struct ConvLayer<B: Backend> {
     weight: Param<Tensor<B, 4>>,
     bias: Option<Param<Tensor<B, 1>>>,
 }
 
-impl<B: Convolve> Conv<B> {
+impl<B: Convolve> ConvLayer<B> {
     /// 3×3 without bias (a norm follows), initialised for ReLU (He et al. 2015).
-    pub fn three([from, to]: [usize; 2], device: &B::Device) -> Self {
-        Conv {
+    pub fn three(from: usize, to: usize, device: &B::Device) -> Self {
+        ConvLayer {
             weight: kaiming(from * TAPS).init([to, from, 3, 3], device),
             bias: None,
         }
     }
 
     /// 1×1 without bias (a norm follows).
-    pub fn one([from, to]: [usize; 2], device: &B::Device) -> Self {
-        Conv {
+    pub fn one(from: usize, to: usize, device: &B::Device) -> Self {
+        ConvLayer {
             weight: kaiming(from).init([to, from, 1, 1], device),
             bias: None,
         }
     }
 
     /// 1×1 with bias, its weights normal with the given standard deviation.
-    pub fn output([from, to]: [usize; 2], deviation: f64, device: &B::Device) -> Self {
+    pub fn output(from: usize, to: usize, deviation: f64, device: &B::Device) -> Self {
         let weight = Initializer::Normal {
             mean: 0.0,
             std: deviation,
         }
         .init([to, from, 1, 1], device);
-        Conv {
+        ConvLayer {
             weight,
             bias: Some(Initializer::Zeros.init([to], device)),
         }

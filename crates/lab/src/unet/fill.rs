@@ -1,5 +1,5 @@
-//! The membrane that the network sees in unknown cells, as products with constant matrices: differentiable in the positions and in a
-//! soft mask. This is the definition; the engine's own (`darn_net::engine`) is tested against it.
+//! The membrane that fills unknown cells of the network's input, as products with constant matrices: differentiable in the positions and in
+//! a soft mask. This is the definition; that of `darn_net::engine` is tested against it.
 
 use burn::tensor::backend::Backend;
 use burn::tensor::{Tensor, TensorData};
@@ -7,8 +7,9 @@ use burn::tensor::{Tensor, TensorData};
 use darn_geometry::grid::SIDE;
 use darn_net::fill::{NOTHING, SATURATION, SWEEPS};
 
-/// A base, where there is one, and over it the membrane of how far known positions are from it; shapes as of [`membrane`].
-pub fn over<B: Backend>(
+/// The base plus the membrane of the known positions' offsets from it; without a base the membrane of the positions. Shapes as in
+/// [`membrane`].
+pub fn fill_over_base<B: Backend>(
     base: Option<Tensor<B, 4>>,
     positions: Tensor<B, 4>,
     known: Tensor<B, 4>,
@@ -21,12 +22,12 @@ pub fn over<B: Backend>(
 
 /// Fills unknown cells smoothly from the known ones.
 ///
-/// `positions [batch, channels, 64, 64]`, `known [batch, 1, 64, 64]` in 0..=1 `-> [batch, channels, 64, 64]`; known cells are kept as far as they are
-/// known. A grid without any known cell becomes zero.
+/// `positions [batch, channels, 64, 64]`, `known [batch, 1, 64, 64]` in 0..=1 `-> [batch, channels, 64, 64]`. A known cell keeps its position, a
+/// partly known cell keeps its share of it. A grid without known cells becomes zero.
 pub fn membrane<B: Backend>(positions: Tensor<B, 4>, known: Tensor<B, 4>) -> Tensor<B, 4> {
     let device = positions.device();
     let [_, channels, ..] = positions.dims();
-    // Repeated rather than broadcast: the backends multiply equal shapes fast.
+    // Repeated and not broadcast: the backends are fast with equal shapes.
     let known = known.repeat_dim(1, channels);
     let mut levels = vec![(positions * known.clone(), known)];
     let mut side = SIDE;
@@ -45,7 +46,7 @@ pub fn membrane<B: Backend>(positions: Tensor<B, 4>, known: Tensor<B, 4>) -> Ten
         } else {
             (weight.clone() * SATURATION).clamp_max(1.0)
         };
-        // Divide only where there is something: weight is bounded below where the share matters.
+        // Where the share is not negligible, the weight is bounded away from zero.
         let given = values / (weight + NOTHING) * share.clone();
         let open = share.neg() + 1.0;
         filled = Some(match filled {
@@ -61,7 +62,7 @@ pub fn membrane<B: Backend>(positions: Tensor<B, 4>, known: Tensor<B, 4>) -> Ten
             }
         });
     }
-    // The loop ran at least once: the pyramid has the finest level.
+    // The pyramid has at least the finest level, so this is never zeros.
     filled.unwrap_or_else(|| Tensor::zeros([1, 1, SIDE, SIDE], &device))
 }
 
@@ -80,7 +81,7 @@ fn both<B: Backend>(matrix: &Tensor<B, 2>, x: Tensor<B, 4>) -> Tensor<B, 4> {
     left.matmul(rows).reshape([batch, channels, m, m])
 }
 
-/// Mean of the four neighbours of every cell, the border's missing ones replaced by the cell itself.
+/// Mean of the four neighbours of every cell; a missing neighbour at the border is replaced by the cell itself.
 fn neighbours<B: Backend>(mean: &Tensor<B, 2>, x: Tensor<B, 4>) -> Tensor<B, 4> {
     let [batch, channels, n, _] = x.dims();
     let across = x

@@ -1,6 +1,5 @@
-//! Batch normalisation in few passes over memory: one affine map per forward, its factors folded on the channels.
-//! Same arithmetic as Ioffe & Szegedy (2015); burn's own layer makes about twice as many passes, which at 64×64 cells cost
-//! more than the convolutions beside it.
+//! Batch normalisation (Ioffe & Szegedy 2015) as one affine map with a factor and an offset for each channel. burn's layer makes about twice
+//! as many passes over memory, which at 64×64 cells cost more than the convolutions.
 
 use burn::module::{Module, Param, RunningState};
 use burn::tensor::Tensor;
@@ -13,17 +12,17 @@ const MOMENTUM: f64 = 0.05;
 
 /// Batch normalisation over the channels of `[batch, channels, height, width]`.
 #[derive(Module, Debug)]
-pub struct Norm<B: Backend> {
+pub struct BatchNorm<B: Backend> {
     scale: Param<Tensor<B, 1>>,
     shift: Param<Tensor<B, 1>>,
     mean: RunningState<Tensor<B, 1>>,
     variance: RunningState<Tensor<B, 1>>,
 }
 
-impl<B: Backend> Norm<B> {
-    /// Identity statistics for `channels` channels.
+impl<B: Backend> BatchNorm<B> {
+    /// A layer for `channels` channels that starts as the identity.
     pub fn new(channels: usize, device: &B::Device) -> Self {
-        Norm {
+        BatchNorm {
             scale: Param::from_tensor(Tensor::ones([channels], device)),
             shift: Param::from_tensor(Tensor::zeros([channels], device)),
             mean: RunningState::new(Tensor::zeros([channels], device)),
@@ -33,10 +32,10 @@ impl<B: Backend> Norm<B> {
 
     /// `[batch, channels, height, width] -> [batch, channels, height, width]`.
     ///
-    /// While its parameters are trained, the batch's own statistics are used and remembered; otherwise the remembered ones.
+    /// While its parameters are trained, it uses the statistics of the batch and updates the running ones; otherwise it uses the running ones.
     pub fn forward(&self, x: Tensor<B, 4>) -> Tensor<B, 4> {
         let [batch, channels, height, width] = x.dims();
-        // One row a channel of an image: the backends have fast paths for a factor by row, and none for one by channel.
+        // One row for each channel of an image: the backends are fast with a factor for each row, not with one for each channel.
         let rows = x.reshape([batch * channels, height * width]);
         let scale = self.scale.val();
         let (mean, variance) = if B::ad_enabled(&rows.device()) && scale.is_require_grad() {

@@ -1,4 +1,4 @@
-//! burn's backends as runtimes of [`darn_net::Network`].
+//! The backends that can compute a [`darn_net::Network`]: the engine, and burn's flex and ndarray.
 
 use std::fmt;
 use std::str::FromStr;
@@ -13,9 +13,9 @@ use darn_net::{
     engine,
 };
 
-use super::{Convolve, Sight, Unet, anchor, build};
+use super::{Convolve, InputTensors, Unet, anchor, build};
 
-/// What computes.
+/// What computes a network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum BackendKind {
     /// darn's own [`engine`].
@@ -27,7 +27,7 @@ pub enum BackendKind {
     Ndarray,
 }
 
-/// A backend's name that is none of [`BackendKind::NAMES`].
+/// A name that is not in [`BackendKind::NAMES`].
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("backend `{name}` is unknown; there are: {}", BackendKind::NAMES.join(", "))]
 pub struct UnknownBackend {
@@ -55,31 +55,34 @@ impl FromStr for BackendKind {
     }
 }
 
-/// What computes a network's answers and its gradients.
+/// What computes the predictions and the gradients of a network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Settings {
+pub struct BackendSettings {
     /// Forward passes.
     pub backend: BackendKind,
-    /// Gradients of the anchor search; the backend's own where there is none.
+    /// Gradients of the anchor search; `None` means `backend`.
     pub autodiff: Option<BackendKind>,
-    /// How darn's own engine computes.
+    /// Options of the engine.
     pub engine: engine::EngineOptions,
 }
 
-impl From<BackendKind> for Settings {
-    fn from(backend: BackendKind) -> Settings {
-        Settings {
+impl From<BackendKind> for BackendSettings {
+    fn from(backend: BackendKind) -> BackendSettings {
+        BackendSettings {
             backend,
-            ..Settings::default()
+            ..BackendSettings::default()
         }
     }
 }
 
-/// Reads a weights file, to be computed by any backend.
+/// Reads a weights file for any backend.
 ///
 /// # Errors
-/// As of [`Network::load`].
-pub fn load_network(bytes: &[u8], settings: impl Into<Settings>) -> Result<Network, NetError> {
+/// As for [`Network::load`].
+pub fn load_network(
+    bytes: &[u8],
+    settings: impl Into<BackendSettings>,
+) -> Result<Network, NetError> {
     let settings = settings.into();
     let (card, tensors) = weights::read(bytes)?;
     weights::check(&card, &tensors)?;
@@ -106,7 +109,7 @@ fn runtime(
     })
 }
 
-/// A network of burn's on a backend.
+/// A network in burn on a backend.
 struct BurnRuntime<B: Convolve> {
     unet: Unet<B>,
     config: UnetConfig,
@@ -142,13 +145,13 @@ where
             Tensor::from_data(data, &device)
         };
         let up = shown.up.clone().map(|up| TensorData::new(up, [count, 3]));
-        let sight = Sight {
+        let input = InputTensors {
             positions: tensor(&shown.positions, 3),
             known: tensor(&shown.known, 1),
             base: shown.base.as_deref().map(|base| tensor(base, 3)),
             up: up.map(|up| Tensor::from_data(up, &device)),
         };
-        let answer = self.unet.predict(self.config.input, sight);
+        let answer = self.unet.predict(self.config.input, input);
         let numbers = answer.into_data().convert::<f32>().into_vec::<f32>();
         Ok(numbers.unwrap_or_default())
     }

@@ -1,18 +1,18 @@
-//! Tensors of a weights file into a network of burn's, and back.
+//! The tensors of a network in burn by name: export, and import with checks.
 
 use std::collections::BTreeMap;
 
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
 use burn::tensor::backend::Backend;
 use burn::tensor::{Tensor, TensorData};
-use darn_net::weights::{NamedTensors, check, read};
-use darn_net::{NetError, UnetConfig, WeightsCard};
+use darn_net::weights::NamedTensors;
+use darn_net::{NetError, UnetConfig};
 
 use super::{Convolve, Unet};
 
-/// All tensors of a module, running statistics included, by name.
+/// All tensors of a module by name, with the running statistics.
 pub fn export<B: Backend, M: Module<B>>(module: &M) -> NamedTensors {
-    let mut export = Export {
+    let mut export = TensorExport {
         path: Vec::new(),
         tensors: BTreeMap::new(),
     };
@@ -23,9 +23,9 @@ pub fn export<B: Backend, M: Module<B>>(module: &M) -> NamedTensors {
 /// The module with all its tensors replaced.
 ///
 /// # Errors
-/// The first tensor (in the module's order) that is missing or has another shape, or a name too many.
-pub fn import<B: Backend, M: Module<B>>(module: M, tensors: &NamedTensors) -> Result<M, NetError> {
-    let mut import = Import {
+/// The first tensor (in the module's order) that is missing or has another shape, or an unexpected name.
+fn import<B: Backend, M: Module<B>>(module: M, tensors: &NamedTensors) -> Result<M, NetError> {
+    let mut import = TensorImport {
         path: Vec::new(),
         tensors,
         used: 0,
@@ -45,24 +45,10 @@ pub fn import<B: Backend, M: Module<B>>(module: M, tensors: &NamedTensors) -> Re
     Ok(module)
 }
 
-/// Builds the network of a weights file on a backend.
-///
-/// # Errors
-/// What [`read`] and [`import`] refuse, and a width outside 1..=256.
-pub fn load<B: Convolve>(
-    bytes: &[u8],
-    device: &B::Device,
-) -> Result<(Unet<B>, WeightsCard), NetError> {
-    let (card, tensors) = read(bytes)?;
-    check(&card, &tensors)?;
-    let network = build(&card.architecture, &tensors, device)?;
-    Ok((network, card))
-}
-
 /// The network of some tensors on a backend.
 ///
 /// # Errors
-/// What [`import`] refuses.
+/// A tensor that is missing, has another shape or an unexpected name.
 pub fn build<B: Convolve>(
     architecture: &UnetConfig,
     tensors: &NamedTensors,
@@ -71,12 +57,12 @@ pub fn build<B: Convolve>(
     import(Unet::<B>::init(architecture, device), tensors)
 }
 
-struct Export {
+struct TensorExport {
     path: Vec<String>,
     tensors: NamedTensors,
 }
 
-impl<B: Backend> ModuleVisitor<B> for Export {
+impl<B: Backend> ModuleVisitor<B> for TensorExport {
     fn enter_module(&mut self, name: &str, _container: &str) {
         self.path.push(name.to_owned());
     }
@@ -97,14 +83,14 @@ impl<B: Backend> ModuleVisitor<B> for Export {
     }
 }
 
-struct Import<'a> {
+struct TensorImport<'a> {
     path: Vec<String>,
     tensors: &'a NamedTensors,
     used: usize,
     error: Option<NetError>,
 }
 
-impl<B: Backend> ModuleMapper<B> for Import<'_> {
+impl<B: Backend> ModuleMapper<B> for TensorImport<'_> {
     fn enter_module(&mut self, name: &str, _container: &str) {
         self.path.push(name.to_owned());
     }

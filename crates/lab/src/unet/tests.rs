@@ -1,4 +1,4 @@
-//! Laws of the room: backends agree, files round-trip or name what is wrong, fills are smooth, directions do not matter.
+//! Tests of the network in burn: backends agree, and damaged tensors are refused by name.
 
 use burn::backend::{Autodiff, Flex, NdArray};
 use burn::tensor::backend::{AutodiffBackend, Backend};
@@ -130,7 +130,7 @@ fn backends_agree_with_the_reference() {
         let silent = filled(&silent.unwrap(), &grids).unwrap();
         assert!(
             largest_distance(&silent[0], &answers[0][0]) > 0.01 * CELL,
-            "the network must have a say in this test"
+            "the network must matter in this test"
         );
     }
 }
@@ -163,7 +163,7 @@ fn convolution_gradients_agree_with_the_reference() {
         Tensor::<NdArray, 4>::random(shape, Distribution::Normal(0.0, 1.0), &Default::default())
             .into_data()
     };
-    // Images that go into products together (a group and a part of one), one by one, and sides that differ.
+    // Images that share products (a group and a part of one), images one by one, and images that are not square.
     for [count, from, to, height, width] in [[70, 3, 5, 4, 4], [2, 4, 3, 40, 40], [3, 2, 2, 5, 9]] {
         let (x, kernel) = (
             random([count, from, height, width]),

@@ -1,0 +1,357 @@
+//! Collisions after strain limiting: a patch that cuts itself or the scan around it is pushed apart.
+//!
+//! Two surfaces that cut each other meet along a curve. Moves that shorten the curve separate them, and need not know
+//! which side is which (Volino & Magnenat-Thalmann 2006, "Resolving surface collisions through intersection contour
+//! minimization"). Costs one sweep over the boxes when nothing cuts.
+
+use super::Patch;
+use super::intersections::intersections_from;
+use super::triangulate::Triangulation;
+use crate::mesh::region::Region;
+use crate::mesh::{TriMesh, Vec3};
+
+/// The scan around a patch with the patch's faces: what is tested for collisions.
+#[derive(Debug, Clone)]
+pub(super) struct CollisionMesh {
+    /// Held vertices: the region's, then those of other layers. The patch's inner ones come after them.
+    positions: Vec<Vec3>,
+    /// Held faces: the region's, then those of other layers; then the patch's.
+    faces: Vec<[u32; 3]>,
+    /// The patch's first face.
+    first_face: usize,
+    /// Edges of the patch with a free end.
+    edges: Vec<RestEdge>,
+    /// Mean of their lengths, scene units.
+    mean_edge: f64,
+}
+
+/// An edge with its length in the chart, scene units.
+#[derive(Debug, Clone)]
+struct RestEdge {
+    from: u32,
+    to: u32,
+    length: f64,
+}
+
+/// Most rounds of pushes.
+const ROUNDS: usize = 100;
+/// Longest push of one round, in mean edges.
+const PUSH: f64 = 0.35;
+/// Sweeps of length correction after each round of pushes.
+const SWEEPS: usize = 4;
+/// Lengths within 1 ± this of their rest lengths are not corrected.
+const GIVE: f64 = 0.03;
+
+impl CollisionMesh {
+    /// The region with the patch that closes its hole; `rim` holds the region vertices of the hole's polygon.
+    pub fn new(rim: &[u32], triangulation: &Triangulation, region: &Region) -> CollisionMesh {
+        let base = region.mesh.positions.len() as u32;
+        let corners = rim.len() as u32;
+        let vertex = |v: u32| rim.get(v as usize).copied().unwrap_or(base + v - corners);
+        let mut faces = region.mesh.faces.clone();
+        faces.extend(triangulation.faces.iter().map(|f| f.map(vertex)));
+        let mut edges: Vec<(u32, u32)> = (triangulation.faces.iter())
+            .flat_map(|f| [(f[0], f[1]), (f[1], f[2]), (f[2], f[0])])
+            .map(|(a, b)| (a.min(b), a.max(b)))
+            .filter(|(_, b)| *b >= corners)
+            .collect();
+        edges.sort_unstable();
+        edges.dedup();
+        let at = |v: u32| triangulation.points[v as usize];
+        let edges: Vec<RestEdge> = (edges.into_iter())
+            .map(|(a, b)| RestEdge {
+                from: vertex(a),
+                to: vertex(b),
+                length: (at(a) - at(b)).norm(),
+            })
+            .collect();
+        CollisionMesh {
+            positions: region.mesh.positions.clone(),
+            first_face: region.mesh.faces.len(),
+            faces,
+            mean_edge: edges.iter().map(|e| e.length).sum::<f64>() / edges.len().max(1) as f64,
+            edges,
+        }
+    }
+
+    /// The same with the region's vertices at other positions.
+    pub fn with_region_at(mut self, region: &[Vec3]) -> CollisionMesh {
+        self.positions[..region.len()].copy_from_slice(region);
+        self
+    }
+
+    /// The same with more of the scan that the patch must not cut: layers over or under it, beyond the region.
+    pub fn with_layers(mut self, layers: &TriMesh) -> CollisionMesh {
+        let (base, more) = (self.positions.len() as u32, layers.positions.len() as u32);
+        // The patch's inner vertices come after all held ones.
+        let moved = |v: u32| if v < base { v } else { v + more };
+        for face in &mut self.faces[self.first_face..] {
+            *face = face.map(moved);
+        }
+        for edge in &mut self.edges {
+            (edge.from, edge.to) = (moved(edge.from), moved(edge.to));
+        }
+        self.positions.extend_from_slice(&layers.positions);
+        let held = layers.faces.iter().map(|f| f.map(|v| base + v));
+        self.faces.splice(self.first_face..self.first_face, held);
+        self.first_face += layers.faces.len();
+        self
+    }
+
+    /// Bytes of memory held.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.positions[..])
+            + size_of_val(&self.faces[..])
+            + size_of_val(&self.edges[..])
+    }
+
+    /// Moves inner vertices of the patch until nothing cuts, or keeps the round with the fewest cuts. Adds the pairs
+    /// that came apart to `patch.collisions` and leaves the rest in `patch.crossings`.
+    pub fn separate(&self, patch: &mut Patch) {
+        let (rim, base) = (patch.rim.len(), self.positions.len());
+        let mut positions = self.positions.clone();
+        positions.extend_from_slice(&patch.positions[rim..]);
+        let mut mesh = TriMesh {
+            positions,
+            faces: self.faces.clone(),
+        };
+        let mut pairs = intersections_from(&mesh, self.first_face);
+        let found = pairs.len();
+        let mut least = found;
+        for _ in 0..ROUNDS {
+            if pairs.is_empty() {
+                break;
+            }
+            self.push(&mut mesh, &pairs);
+            for _ in 0..SWEEPS {
+                self.restore_lengths(&mut mesh.positions);
+            }
+            pairs = intersections_from(&mesh, self.first_face);
+            if pairs.len() < least {
+                least = pairs.len();
+                patch.positions[rim..].copy_from_slice(&mesh.positions[base..]);
+            }
+        }
+        patch.collisions += found - least;
+        patch.crossings = least;
+    }
+
+    /// One step along the gradients of the intersection curves' lengths.
+    fn push(&self, mesh: &mut TriMesh, pairs: &[(u32, u32)]) {
+        let base = self.positions.len();
+        let mut moves = vec![Vec3::zeros(); mesh.positions.len() - base];
+        let mut add = |v: u32, d: Vec3| {
+            if let Some(m) = (v as usize)
+                .checked_sub(base)
+                .and_then(|k| moves.get_mut(k))
+            {
+                *m += d;
+            }
+        };
+        for (f, g) in pairs {
+            for (own, other) in [(*f, *g), (*g, *f)] {
+                let (a, b) = (self.faces[own as usize], self.faces[other as usize]);
+                for k in 0..3 {
+                    let edge = [a[k], a[(k + 1) % 3], a[(k + 2) % 3]];
+                    if let Some(crossing) = EdgeCrossing::new(
+                        edge.map(|v| mesh.positions[v as usize]),
+                        mesh.triangle(other as usize),
+                    ) {
+                        add(edge[0], crossing.push * (1.0 - crossing.along));
+                        add(edge[1], crossing.push * crossing.along);
+                        (0..3).for_each(|k| add(b[k], -crossing.push * crossing.weights[k]));
+                    }
+                }
+            }
+        }
+        // Neighbours take part in half of each move: a vertex that moves alone is a spike.
+        let mut shared = moves.clone();
+        for edge in &self.edges {
+            if let (Some(a), Some(b)) = (
+                (edge.from as usize).checked_sub(base),
+                (edge.to as usize).checked_sub(base),
+            ) {
+                shared[a] += moves[b] * 0.5;
+                shared[b] += moves[a] * 0.5;
+            }
+        }
+        for (k, d) in shared.into_iter().enumerate() {
+            mesh.positions[base + k] += d.cap_magnitude(1.0) * (PUSH * self.mean_edge);
+        }
+    }
+
+    /// Corrects the lengths of edges that the pushes stretched or compressed, one edge after the other.
+    fn restore_lengths(&self, positions: &mut [Vec3]) {
+        let base = self.positions.len();
+        for RestEdge { from, to, length } in &self.edges {
+            let (a, b) = (*from as usize, *to as usize);
+            let d = positions[b] - positions[a];
+            let now = d.norm();
+            let wanted = now.clamp(length * (1.0 - GIVE), length * (1.0 + GIVE));
+            if wanted != now && now > 0.0 {
+                let (wa, wb) = (
+                    f64::from(u8::from(a >= base)),
+                    f64::from(u8::from(b >= base)),
+                );
+                let shift = d * (0.5 * (now - wanted) / (now * (wa + wb)));
+                positions[a] += shift * wa;
+                positions[b] -= shift * wb;
+            }
+        }
+    }
+}
+
+/// The point where an edge of one face passes through another face.
+struct EdgeCrossing {
+    /// Its place on the edge, from 0 at the start to 1 at the end.
+    along: f64,
+    /// Its barycentric weights in the other face.
+    weights: [f64; 3],
+    /// The direction in which the edge should move, relative to the face, to shorten the intersection curve; length at
+    /// most 1.
+    push: Vec3,
+}
+
+impl EdgeCrossing {
+    /// Where the edge from corner 0 to corner 1 of a face passes through another face.
+    fn new(face: [Vec3; 3], other: [Vec3; 3]) -> Option<EdgeCrossing> {
+        let (u, v) = (other[1] - other[0], other[2] - other[0]);
+        let normal = u.cross(&v).try_normalize(0.0)?;
+        let side = |p: &Vec3| normal.dot(&(p - other[0]));
+        let (from, to) = (side(&face[0]), side(&face[1]));
+        if from * to >= 0.0 {
+            return None;
+        }
+        let along = from / (from - to);
+        let x = face[0] + (face[1] - face[0]) * along;
+        let doubled = u.cross(&v).dot(&normal);
+        let weight = |k: usize| {
+            let (b, c) = (other[(k + 1) % 3] - x, other[(k + 2) % 3] - x);
+            b.cross(&c).dot(&normal) / doubled
+        };
+        let weights = [weight(0), weight(1), weight(2)];
+        if weights.iter().any(|w| *w < 0.0) {
+            return None;
+        }
+        // The direction of the curve: in both planes, from the edge into its face.
+        let own = (face[1] - face[0]).cross(&(face[2] - face[0]));
+        let line = own.cross(&normal).try_normalize(0.0)?;
+        let inward = own.cross(&(face[1] - face[0]));
+        let curve = if line.dot(&inward) > 0.0 { line } else { -line };
+        let edge = (face[1] - face[0]).try_normalize(0.0)?;
+        // d(length) = −d · (R − (E·R ÷ E·N) N); the least slope bounds the push of a grazing edge.
+        let slope = edge.dot(&normal);
+        let slope = slope.signum() * slope.abs().max(0.2);
+        let push = curve - normal * (edge.dot(&curve) / slope);
+        Some(EdgeCrossing {
+            along,
+            weights,
+            push: push.cap_magnitude(1.0),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::Vec2;
+
+    /// A lattice of n × n vertices, unit spacing, at height `z` of their place; its faces count vertices from `first`
+    /// on.
+    fn lattice(n: u32, first: u32, z: impl Fn(Vec2) -> f64) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+        let middle = Vec2::repeat(f64::from(n - 1) / 2.0);
+        let at = |k: u32| Vec2::new(f64::from(k % n), f64::from(k / n)) - middle;
+        let points = (0..n * n)
+            .map(at)
+            .map(|p| Vec3::new(p.x, p.y, z(p)))
+            .collect();
+        let faces = (0..n - 1)
+            .flat_map(|j| (0..n - 1).map(move |i| first + j * n + i))
+            .flat_map(|a| [[a, a + 1, a + n + 1], [a, a + n + 1, a + n]])
+            .collect();
+        (points, faces)
+    }
+
+    #[test]
+    fn a_dent_through_another_layer_is_removed() {
+        let (positions, mut faces) = lattice(14, 0, |p| 0.01 * p.x);
+        let (first_face, base) = (faces.len(), positions.len() as u32);
+        let (tile, tile_faces) = lattice(9, base, |p| 0.5 - 0.9 * (-0.5 * p.norm_squared()).exp());
+        faces.extend(&tile_faces);
+        let at = |v: u32| tile[(v - base) as usize];
+        let edges: Vec<RestEdge> = (tile_faces.iter())
+            .flat_map(|f| [(f[0], f[1]), (f[1], f[2])])
+            .map(|(from, to)| RestEdge {
+                from,
+                to,
+                length: (at(from) - at(to)).norm(),
+            })
+            .collect();
+        let around = CollisionMesh {
+            positions,
+            faces,
+            first_face,
+            edges,
+            mean_edge: 1.0,
+        };
+        let mut patch = Patch {
+            rim: Vec::new(),
+            flat: Vec::new(),
+            positions: tile.clone(),
+            faces: tile_faces,
+            strain_rounds: 0,
+            collisions: 0,
+            crossings: 0,
+        };
+        let joined = |tile: &[Vec3]| TriMesh {
+            positions: around.positions.iter().chain(tile).copied().collect(),
+            faces: around.faces.clone(),
+        };
+        let before = intersections_from(&joined(&tile), first_face).len();
+        assert!(before > 0);
+        around.separate(&mut patch);
+        assert_eq!((patch.collisions, patch.crossings), (before, 0));
+        assert_eq!(
+            intersections_from(&joined(&patch.positions), first_face),
+            []
+        );
+        let again = patch.positions.clone();
+        around.separate(&mut patch);
+        assert_eq!(patch.collisions, before, "counted once");
+        assert_eq!(
+            patch.positions, again,
+            "a patch that cuts nothing stays as it is"
+        );
+
+        // The result is the same when all of the mesh below is another layer.
+        let layer = TriMesh {
+            positions: around.positions.clone(),
+            faces: around.faces[..first_face].to_vec(),
+        };
+        let own = |v: u32| v - base;
+        let alone = CollisionMesh {
+            positions: Vec::new(),
+            faces: around.faces[first_face..]
+                .iter()
+                .map(|f| f.map(own))
+                .collect(),
+            first_face: 0,
+            edges: around
+                .edges
+                .iter()
+                .map(|e| RestEdge {
+                    from: own(e.from),
+                    to: own(e.to),
+                    length: e.length,
+                })
+                .collect(),
+            mean_edge: 1.0,
+        };
+        (patch.positions, patch.collisions) = (tile, 0);
+        alone.clone().separate(&mut patch);
+        assert_eq!(patch.collisions, 0, "it does not cut itself");
+        alone.with_layers(&layer).separate(&mut patch);
+        assert_eq!((patch.collisions, patch.crossings), (before, 0));
+        assert_eq!(patch.positions, again);
+    }
+}

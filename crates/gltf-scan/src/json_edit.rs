@@ -1,0 +1,160 @@
+//! Edits a JSON text and leaves every other character unchanged: spelling of numbers, escapes, spaces, even repeated
+//! keys.
+//!
+//! A round trip through `serde_json::Value` changes characters: even with arbitrary precision it writes `1E5` as
+//! `1e+5`.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use serde_json::Value;
+use serde_json::value::RawValue;
+
+use super::error::ScanError;
+
+/// The text of a JSON object, and edits to make in it.
+pub(super) struct JsonEdit<'t> {
+    text: &'t str,
+    root: &'t str,
+    /// Replacements in disjoint places; an empty range inserts.
+    edits: Vec<(Range<usize>, String)>,
+    /// New members of the root object.
+    members: String,
+}
+
+impl<'t> JsonEdit<'t> {
+    /// No edits yet. The text is known to parse.
+    pub fn new(text: &'t [u8]) -> Result<Self, ScanError> {
+        let invalid = || ScanError::Invalid {
+            pointer: String::new(),
+            detail: "must be a JSON object".into(),
+        };
+        let text = std::str::from_utf8(text).map_err(|_| invalid())?;
+        let root: &RawValue = serde_json::from_str(text).map_err(|_| invalid())?;
+        Ok(Self {
+            text,
+            root: root.get().trim(),
+            edits: Vec::new(),
+            members: String::new(),
+        })
+    }
+
+    /// Replaces the value at `path`, which must be there.
+    pub fn replace(&mut self, path: &[&str], value: &Value) -> Result<(), ScanError> {
+        let old = self
+            .find(path)?
+            .ok_or_else(|| invalid(path, "is missing"))?;
+        self.edits.push((self.span(old), value.to_string()));
+        Ok(())
+    }
+
+    /// Appends to the array at `path`; a missing array is created if it is a member of the root.
+    pub fn append(&mut self, path: &[&str], values: &[Value]) -> Result<(), ScanError> {
+        let new = values
+            .iter()
+            .map(Value::to_string)
+            .collect::<Vec<_>>()
+            .join(",");
+        match (self.find(path)?, path) {
+            (Some(array), _) => {
+                let old: Vec<&RawValue> =
+                    serde_json::from_str(array).map_err(|_| invalid(path, "must be an array"))?;
+                let comma = if old.is_empty() { "" } else { "," };
+                let close = self.span(array).end.saturating_sub(1);
+                self.edits.push((close..close, format!("{comma}{new}")));
+            }
+            // The comma is right: the root is never empty, it has an `asset`.
+            (None, [key]) => self.members.push_str(&format!(",\"{key}\":[{new}]")),
+            (None, _) => return Err(invalid(path, "is missing")),
+        }
+        Ok(())
+    }
+
+    /// The edited text.
+    pub fn finish(mut self) -> String {
+        let close = self.span(self.root).end.saturating_sub(1);
+        self.edits
+            .push((close..close, std::mem::take(&mut self.members)));
+        self.edits.sort_by_key(|(range, _)| range.start);
+        let mut out = String::with_capacity(
+            self.text.len() + self.edits.iter().map(|(_, new)| new.len()).sum::<usize>(),
+        );
+        let mut at = 0;
+        for (range, new) in &self.edits {
+            out.push_str(self.text.get(at..range.start).unwrap_or_default());
+            out.push_str(new);
+            at = range.end;
+        }
+        out.push_str(self.text.get(at..).unwrap_or_default());
+        out
+    }
+
+    /// The text of the value at `path` (keys and array indices).
+    fn find(&self, path: &[&str]) -> Result<Option<&'t str>, ScanError> {
+        let mut at = self.root;
+        for (depth, key) in path.iter().enumerate() {
+            let here = path.get(..depth).unwrap_or_default();
+            let next: Option<&'t RawValue> = match key.parse::<usize>() {
+                Ok(index) => {
+                    let items: Vec<&RawValue> =
+                        serde_json::from_str(at).map_err(|_| invalid(here, "must be an array"))?;
+                    items.get(index).copied()
+                }
+                Err(_) => {
+                    // Of repeated keys the last one counts, as in reading.
+                    let members: BTreeMap<String, &RawValue> =
+                        serde_json::from_str(at).map_err(|_| invalid(here, "must be an object"))?;
+                    members.get(*key).copied()
+                }
+            };
+            match next {
+                Some(next) => at = next.get(),
+                None => return Ok(None),
+            }
+        }
+        Ok(Some(at))
+    }
+
+    /// The range of a slice of the text.
+    fn span(&self, part: &str) -> Range<usize> {
+        let start = (part.as_ptr() as usize).saturating_sub(self.text.as_ptr() as usize);
+        start..start + part.len()
+    }
+}
+
+fn invalid(path: &[&str], detail: &str) -> ScanError {
+    ScanError::Invalid {
+        pointer: path.iter().map(|key| format!("/{key}")).collect(),
+        detail: detail.into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn only_the_edited_places_change() {
+        let text = " { \"a\" : [ 1E5 , 2 ] ,\n\"b\":{\"c\": [],\"n\":1.0} , \"\\u0062\\u0062\":[{\"n\" :7}] } ";
+        let mut edit = JsonEdit::new(text.as_bytes()).unwrap();
+        edit.append(&["a"], &[json!(3), json!({"x": 4})]).unwrap();
+        edit.append(&["b", "c"], &[json!(5)]).unwrap();
+        edit.replace(&["bb", "0", "n"], &json!(8)).unwrap();
+        edit.append(&["new"], &[json!(6)]).unwrap();
+        assert_eq!(
+            edit.finish(),
+            " { \"a\" : [ 1E5 , 2 ,3,{\"x\":4}] ,\n\"b\":{\"c\": [5],\"n\":1.0} , \"\\u0062\\u0062\":[{\"n\" :8}] ,\"new\":[6]} "
+        );
+    }
+
+    #[test]
+    fn missing_and_mistyped_values_are_named() {
+        let mut edit = JsonEdit::new(b"{\"a\":{}}").unwrap();
+        assert_eq!(edit.append(&["a"], &[]).unwrap_err().pointer(), Some("/a"));
+        assert_eq!(
+            edit.replace(&["a", "b"], &json!(1)).unwrap_err().pointer(),
+            Some("/a/b")
+        );
+    }
+}

@@ -1,0 +1,44 @@
+//! A patch as [`super::Scan::write`] takes it.
+
+use darn_geometry::mesh::Vec3;
+use serde_json::Value;
+
+/// A patch to append to the scan as a primitive of its own.
+///
+/// Its attributes are those of the part whose material it takes: normals if that part has them, and as many texture
+/// coordinate and colour sets, each `[points.len()]`. On a skinned mesh its joints and weights come from the scan's
+/// vertices among its points.
+#[derive(Debug, Clone)]
+pub struct PatchPrimitive {
+    /// Index into `Scan::parts` of a part of the mesh and node that take the patch.
+    pub part: usize,
+    /// Index into `Scan::parts` of the part whose material is copied.
+    pub material_of: usize,
+    /// The patch's vertices.
+    pub points: Vec<PatchPoint>,
+    /// Triangles over `points`, counter-clockwise in scene space.
+    pub faces: Vec<[u32; 3]>,
+    /// Whether a second primitive shows the patch's other side, as in scans that store each piece of cloth as two
+    /// layers of triangles.
+    pub both_sides: bool,
+    /// Normals in scene space, `[points.len()]`, of any length except zero; not read if the part has none.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinate sets.
+    pub texcoords: Vec<Vec<[f32; 2]>>,
+    /// Colour sets, linear RGBA.
+    pub colors: Vec<Vec<[f32; 4]>>,
+    /// Name of the new accessors and buffer views.
+    pub name: String,
+    /// What is recorded about the patch: `extras.darn` of its primitive.
+    pub extras: Value,
+}
+
+/// A vertex of a patch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PatchPoint {
+    /// A vertex of `Scan::surface`. Its stored position is copied bit for bit if it belongs to the node that takes the
+    /// patch.
+    Scan(u32),
+    /// A point in scene space; it is transformed to the node's space and rounded to f32.
+    New(Vec3),
+}

@@ -1,0 +1,145 @@
+//! A scan in memory: its geometry, and the file it was read from.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use bytes::Bytes;
+use darn_geometry::mesh::TriMesh;
+use gltf::json::accessor::Type;
+use serde_json::Value;
+
+use super::container::{Container, ContainerLayout};
+use super::scene::NodeTransform;
+use super::skin::{Influence, Influences};
+
+/// A scan: the original bytes and the geometry decoded from them.
+#[derive(Debug, Clone)]
+pub struct Scan {
+    /// All triangles that the default scene draws, in scene space, not welded. Triangles that name a vertex twice are
+    /// left out.
+    pub surface: TriMesh,
+    /// The drawn primitives in the order of their faces in `surface`.
+    pub parts: Vec<ScanPart>,
+    /// The vertices of `surface` by the accessor they come from, in order.
+    pub(crate) blocks: Vec<VertexBlock>,
+    pub(crate) bytes: Bytes,
+    pub(crate) layout: ContainerLayout,
+    pub(crate) json: Value,
+}
+
+/// A triangle primitive as one node draws it.
+#[derive(Debug, Clone)]
+pub struct ScanPart {
+    /// Index of the node.
+    pub node: usize,
+    /// Index of the mesh.
+    pub mesh: usize,
+    /// Index of the primitive in its mesh.
+    pub primitive: usize,
+    /// Index of the material, if it has one.
+    pub material: Option<usize>,
+    /// Its vertices in `Scan::surface`. Primitives of a node that share their POSITION accessor share this range.
+    pub vertices: Range<u32>,
+    /// Its faces in `Scan::surface`; the parts' ranges follow one another.
+    pub faces: Range<u32>,
+    /// TEXCOORD_0, TEXCOORD_1, …, each `[vertices.len()]`, indexed by vertex − `vertices.start`; NaN and infinities
+    /// read as 0.
+    pub texcoords: Vec<Arc<[[f32; 2]]>>,
+    /// COLOR_0, COLOR_1, … in the same way, linear RGBA; a set without alpha has alpha 1.
+    pub colors: Vec<Arc<[[f32; 4]]>>,
+    /// NORMAL as stored, in the node's space, `[vertices.len()]`; without normals the primitive is drawn flat.
+    pub normals: Option<Arc<[[f32; 3]]>>,
+    /// Whether darn made it: its `extras.darn.reconstructed` says so.
+    pub reconstructed: bool,
+    /// Whether several drawn nodes share this mesh: a patch written once then shows at each of them.
+    pub shared: bool,
+    /// Whether this is the first drawn node of its mesh, the one to patch.
+    pub first_instance: bool,
+    /// Number of morph targets.
+    pub(crate) targets: usize,
+    /// The types of the colour sets in the file: VEC3 or VEC4.
+    pub(crate) color_kinds: Vec<Type>,
+    pub(crate) transform: NodeTransform,
+    /// JOINTS_0 and WEIGHTS_0, JOINTS_1 and WEIGHTS_1, …, as `texcoords`; `None` if no node draws the mesh with a skin.
+    pub(crate) skinning: Option<Vec<Influences>>,
+}
+
+/// Consecutive vertices that come from one accessor of one node, and their stored positions.
+#[derive(Debug, Clone)]
+pub(crate) struct VertexBlock {
+    pub node: usize,
+    /// First vertex in `Scan::surface`.
+    pub start: u32,
+    /// As stored, in the node's space.
+    pub local: Vec<[f32; 3]>,
+}
+
+impl Scan {
+    /// The container it was read from; [`Scan::write`] writes the same.
+    pub fn container(&self) -> Container {
+        self.layout.container
+    }
+
+    /// Memory it holds, in bytes, estimated.
+    pub fn bytes_held(&self) -> usize {
+        let attributes = |part: &ScanPart| {
+            let texcoords: usize = part.texcoords.iter().map(|set| 8 * set.len()).sum();
+            let colors: usize = part.colors.iter().map(|set| 16 * set.len()).sum();
+            let skinning = part.skinning.iter().flatten();
+            let skinning: usize = skinning.map(|set| size_of::<Influence>() * set.len()).sum();
+            let normals = part.normals.as_ref().map_or(0, |set| 12 * set.len());
+            texcoords + colors + normals + skinning
+        };
+        let parts: usize = self.parts.iter().map(attributes).sum();
+        let surface = 24 * self.surface.positions.len() + 12 * self.surface.faces.len();
+        let local: usize = self.blocks.iter().map(|b| 12 * b.local.len()).sum();
+        // A parsed data URI takes as much memory as its text, a list of small numbers ten times as much; 4 lies
+        // between.
+        let json = 4 * self.layout.json.len();
+        self.bytes.len() + json + surface + local + parts
+    }
+
+    /// The part that a face of `surface` belongs to, as an index into `parts`.
+    pub fn part_of_face(&self, face: u32) -> Option<usize> {
+        let at = self.parts.partition_point(|part| part.faces.end <= face);
+        self.parts
+            .get(at)
+            .filter(|part| part.faces.contains(&face))
+            .map(|_| at)
+    }
+
+    /// The name of a part's mesh, or of its node if the mesh has none.
+    pub fn mesh_name(&self, part: usize) -> Option<&str> {
+        let part = self.parts.get(part)?;
+        let name =
+            |list: &str, index: usize| self.json.get(list)?.get(index)?.get("name")?.as_str();
+        name("meshes", part.mesh).or_else(|| name("nodes", part.node))
+    }
+
+    /// Whether the file turns on morph targets of a drawn mesh. Viewers then show another shape than `surface`, and a
+    /// patch fits its rim only where the targets do not move the rim.
+    pub fn posed_by_morph_targets(&self) -> bool {
+        let weights = |list: &str, index: usize| {
+            let weights = self.json.get(list)?.get(index)?.get("weights")?;
+            weights.as_array()
+        };
+        let on = |weight: &Value| weight.as_f64().is_some_and(|weight| weight != 0.0);
+        self.parts.iter().any(|part| {
+            // A node's weights replace its mesh's (glTF 2.0, 3.7.2.2).
+            weights("nodes", part.node)
+                .or_else(|| weights("meshes", part.mesh))
+                .is_some_and(|weights| weights.iter().take(part.targets).any(on))
+        })
+    }
+
+    /// The node that a vertex of `surface` belongs to, and its position as stored there.
+    pub(crate) fn stored_position(&self, vertex: u32) -> Option<(usize, [f32; 3])> {
+        let at = self
+            .blocks
+            .partition_point(|block| block.start <= vertex)
+            .checked_sub(1)?;
+        let block = self.blocks.get(at)?;
+        let local = *block.local.get((vertex - block.start) as usize)?;
+        Some((block.node, local))
+    }
+}

@@ -1,0 +1,77 @@
+//! The whole service around a mender that returns every scan unchanged.
+//!
+//! ```sh
+//! cargo run -p darn-serve --example echo -- --listen 127.0.0.1:8080
+//! curl --data-binary @scan.glb -H 'content-type: model/gltf-binary' 127.0.0.1:8080/inpaint > same.glb
+//! ```
+
+use std::sync::Arc;
+
+use bytes::Bytes;
+use clap::Parser;
+use darn_contract::port::{Cancellation, EditSession, Mended, Mender, Refusal};
+use darn_contract::{Constraints, Search, codes, v1};
+use darn_serve::{ServeArgs, ServeError, run, start_logging};
+
+#[derive(Parser)]
+struct Args {
+    #[command(flatten)]
+    serve: ServeArgs,
+}
+
+struct Echo;
+
+impl Mender for Echo {
+    fn inpaint(
+        &self,
+        scan: Bytes,
+        _: &Constraints,
+        _: Cancellation<'_>,
+    ) -> Result<Mended, Refusal> {
+        let bytes = scan.into();
+        let report = v1::Report::default();
+        Ok(Mended { bytes, report })
+    }
+
+    fn find_holes(&self, _: Bytes) -> Result<v1::HolesReport, Refusal> {
+        Ok(v1::HolesReport::default())
+    }
+
+    fn optimize_anchor(
+        &self,
+        _: Bytes,
+        _: &Search,
+        _: Cancellation<'_>,
+    ) -> Result<v1::AnchorFound, Refusal> {
+        Err(no_holes())
+    }
+
+    fn mend_to_target(&self, _: Bytes, _: &Search, _: Cancellation<'_>) -> Result<Mended, Refusal> {
+        Err(no_holes())
+    }
+
+    fn open(
+        &self,
+        _: Bytes,
+        _: &Constraints,
+        _: Cancellation<'_>,
+    ) -> Result<Box<dyn EditSession>, Refusal> {
+        Err(no_holes())
+    }
+
+    fn warm_up(&self) -> Result<(), Refusal> {
+        Ok(())
+    }
+}
+
+fn no_holes() -> Refusal {
+    Refusal::new(codes::NO_HOLES, "this mender finds no holes")
+}
+
+fn main() -> Result<(), ServeError> {
+    let args = Args::parse();
+    if let Err(error) = start_logging(&args.serve.log, args.serve.log_format) {
+        eprintln!("{error}");
+    }
+    run(&args.serve, Arc::new(Echo))
+}

@@ -1,0 +1,361 @@
+//! Reads a request's body within its limits, and finds in it the scan and the parameters: constraints or a query.
+
+use std::{future::poll_fn, pin::Pin};
+
+use axum::{
+    body::{Body, HttpBody},
+    extract::{DefaultBodyLimit, FromRequest, Multipart, Request, multipart::MultipartError},
+    http::{HeaderMap, header, request::Parts},
+};
+use bytes::{Bytes, BytesMut};
+use tokio::time::{Duration, Instant, timeout, timeout_at};
+
+use super::{
+    app::{App, RequestLimits, UploadPermit},
+    error::RequestError,
+    media_types::{FORM_DATA, GLB, GLTF, JSON, OCTET_STREAM},
+    parameters::{self, Parameters},
+};
+use darn_contract::{Constraints, FieldError};
+
+/// Most bytes of an unwanted body that are read and dropped, as a multiple of the body limit.
+const DRAIN_FACTOR: u64 = 4;
+/// Longest time for which an unwanted body is read and dropped.
+const DRAIN_TIME: Duration = Duration::from_secs(2);
+/// The time for a whole body, as a multiple of the longest pause.
+const PAUSES_PER_BODY: u32 = 8;
+/// The media types of a body with a scan, for an error's text.
+const SCAN_BODY_MEDIA_TYPES: &str = "model/gltf-binary, model/gltf+json or multipart/form-data";
+/// The media types of the part `scan`, for an error's text.
+const SCAN_PART_MEDIA_TYPES: &str = "model/gltf-binary or model/gltf+json";
+/// The media types that the part `scan` is read from. `application/octet-stream` is what curl declares for any file.
+const SCAN_PART_READ: [&str; 3] = [GLB, GLTF, OCTET_STREAM];
+
+/// A request with a scan.
+#[derive(Debug)]
+pub struct ScanRequest<P> {
+    /// The scan's bytes; not empty.
+    pub scan: Bytes,
+    /// Checked constraints or query; `None` when the request carries none.
+    pub parameters: Option<P>,
+    /// Allows the request to queue its job.
+    pub upload: UploadPermit,
+}
+
+impl ScanRequest<Constraints> {
+    /// The same request, for a job that takes no constraints.
+    ///
+    /// # Errors
+    /// `Invalid` when it carries some.
+    pub fn without_constraints(self) -> Result<Self, RequestError> {
+        if self.parameters.is_none() {
+            return Ok(self);
+        }
+        let detail = "finding holes takes no constraints in this version";
+        Err(Constraints::invalid(vec![FieldError::new("", detail)]))
+    }
+}
+
+/// Limits the time in which a body comes.
+#[derive(Debug)]
+pub struct BodyTimer {
+    /// Longest time between two pieces.
+    pause: Duration,
+    /// When the whole body must have come.
+    end: Instant,
+}
+
+impl BodyTimer {
+    /// Starts now.
+    pub fn new(limits: &RequestLimits) -> Self {
+        let end = Instant::now() + limits.body_pause * PAUSES_PER_BODY;
+        Self {
+            pause: limits.body_pause,
+            end,
+        }
+    }
+
+    /// Waits for the next piece of a body.
+    ///
+    /// # Errors
+    /// `BodyTimeout` when this piece or the whole body takes too long.
+    pub async fn next<T>(&self, piece: impl Future<Output = T>) -> Result<T, RequestError> {
+        let until = self.end.min(Instant::now() + self.pause);
+        (timeout_at(until, piece).await).map_err(|_| RequestError::BodyTimeout {
+            seconds: self.pause.as_secs_f64(),
+            whole: (self.pause * PAUSES_PER_BODY).as_secs_f64(),
+        })
+    }
+}
+
+/// How a body carries a scan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum ScanBody {
+    /// The body is the scan.
+    Bare,
+    /// The scan is a part of multipart/form-data.
+    Form,
+}
+
+/// Receives a request with a scan, unless the service is full or shuts down.
+///
+/// # Errors
+/// `UploadsFull`, `QueueFull` or `Draining` before the body is read, and those of reading it: `UnsupportedMediaType`,
+/// `ContentEncoding`, `TooLarge`, `ParametersTooLarge`, `BodyTimeout`, `EmptyBody`, `Malformed` or `Invalid`.
+pub async fn receive_scan<P: Parameters>(
+    app: &App,
+    request: Request,
+) -> Result<ScanRequest<P>, RequestError> {
+    match app.upload_permit() {
+        Ok(upload) => read_scan(request, upload, &app.limits).await,
+        Err(error) => {
+            discard(request, &app.limits);
+            Err(error)
+        }
+    }
+}
+
+async fn read_scan<P: Parameters>(
+    request: Request,
+    upload: UploadPermit,
+    limits: &RequestLimits,
+) -> Result<ScanRequest<P>, RequestError> {
+    let (parts, body) = request.into_parts();
+    let check_headers = || {
+        let kind = scan_body(&parts.headers)?;
+        check_encoding(&parts.headers)?;
+        check_length(&parts.headers, limits.body)?;
+        Ok(kind)
+    };
+    let (kind, bytes) = read_body(&parts, body, limits, check_headers).await?;
+    let (scan, parameters) = match kind {
+        ScanBody::Bare => (bytes, None),
+        ScanBody::Form => split_form(parts, bytes).await?,
+    };
+    if scan.is_empty() {
+        return Err(RequestError::EmptyBody);
+    }
+    Ok(ScanRequest {
+        scan,
+        parameters,
+        upload,
+    })
+}
+
+/// Reads a request without a scan, whose body is the JSON of its parameters; `None` when the body is empty.
+///
+/// # Errors
+/// `UnsupportedMediaType`, `ContentEncoding`, `ParametersTooLarge`, `BodyTimeout`, `Malformed` or `Invalid`.
+pub async fn read_parameters<P: Parameters>(
+    request: Request,
+    limits: &RequestLimits,
+) -> Result<Option<P>, RequestError> {
+    let (parts, body) = request.into_parts();
+    let limits = RequestLimits {
+        body: parameters::MAX_BYTES,
+        ..*limits
+    };
+    let check_headers = || {
+        check_encoding(&parts.headers)?;
+        check_length(&parts.headers, limits.body)?;
+        match essence(content_type(&parts.headers)).as_str() {
+            "" => Ok(false),
+            media_type if parameters::MEDIA_TYPES.contains(&media_type) => Ok(true),
+            _ => Err(unsupported(&parts.headers, JSON)),
+        }
+    };
+    let read = read_body(&parts, body, &limits, check_headers).await;
+    let (is_json, text) = read.map_err(|error| match error {
+        RequestError::TooLarge { limit } => RequestError::ParametersTooLarge {
+            kind: P::KIND,
+            limit,
+        },
+        error => error,
+    })?;
+    if text.is_empty() {
+        Ok(None)
+    } else if is_json {
+        P::parse(&text).map(Some)
+    } else {
+        Err(unsupported(&parts.headers, JSON))
+    }
+}
+
+/// Reads a body to its end if its headers pass `check_headers`; discards it after any error but a timeout.
+async fn read_body<T>(
+    parts: &Parts,
+    mut body: Body,
+    limits: &RequestLimits,
+    check_headers: impl FnOnce() -> Result<T, RequestError>,
+) -> Result<(T, Bytes), RequestError> {
+    let read = async {
+        let checked = check_headers()?;
+        Ok((checked, read_bytes(&mut body, limits).await?))
+    };
+    let outcome = read.await;
+    if outcome
+        .as_ref()
+        .is_err_and(|error| !matches!(error, RequestError::BodyTimeout { .. }))
+    {
+        discard_body(&parts.headers, body, limits);
+    }
+    outcome
+}
+
+/// Reads and drops the body of a refused request, within bounds and without delaying the answer: a client that is still sending would
+/// otherwise see a broken connection instead of the answer. A client that waits for `100 Continue` sends nothing to read.
+pub fn discard(request: Request, limits: &RequestLimits) {
+    let (parts, body) = request.into_parts();
+    discard_body(&parts.headers, body, limits);
+}
+
+fn discard_body(headers: &HeaderMap, mut body: Body, limits: &RequestLimits) {
+    if headers.contains_key(header::EXPECT) {
+        return;
+    }
+    let limit = (limits.body as u64).saturating_mul(DRAIN_FACTOR);
+    let drained = async move {
+        let mut seen = 0;
+        while let Some(Ok(piece)) = next_piece(&mut body).await {
+            seen += piece.len() as u64;
+            if seen > limit {
+                return;
+            }
+        }
+    };
+    tokio::spawn(timeout(DRAIN_TIME, drained));
+}
+
+fn scan_body(headers: &HeaderMap) -> Result<ScanBody, RequestError> {
+    match essence(content_type(headers)).as_str() {
+        GLB | GLTF => Ok(ScanBody::Bare),
+        FORM_DATA => Ok(ScanBody::Form),
+        _ => Err(unsupported(headers, SCAN_BODY_MEDIA_TYPES)),
+    }
+}
+
+fn content_type(headers: &HeaderMap) -> &str {
+    headers
+        .get(header::CONTENT_TYPE)
+        .map_or("", |value| value.to_str().unwrap_or("(not text)"))
+}
+
+/// A media type without its parameters, in lower case.
+fn essence(media_type: &str) -> String {
+    let bare = media_type.split(';').next().unwrap_or_default();
+    bare.trim().to_ascii_lowercase()
+}
+
+fn unsupported(headers: &HeaderMap, send: &'static str) -> RequestError {
+    let got = match content_type(headers) {
+        "" => "(none)".to_owned(),
+        got => format!("`{}`", cut(got, 100)),
+    };
+    RequestError::UnsupportedMediaType { got, send }
+}
+
+/// Refuses a compressed body, which would otherwise be read as a broken scan.
+fn check_encoding(headers: &HeaderMap) -> Result<(), RequestError> {
+    for value in headers.get_all(header::CONTENT_ENCODING) {
+        let got = value.to_str().unwrap_or("(not text)");
+        let is_unknown = |coding: &str| {
+            let coding = coding.trim();
+            !coding.is_empty() && !coding.eq_ignore_ascii_case("identity")
+        };
+        if got.split(',').any(is_unknown) {
+            return Err(RequestError::ContentEncoding { got: cut(got, 100) });
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a body that its `content-length` declares too large.
+fn check_length(headers: &HeaderMap, limit: usize) -> Result<(), RequestError> {
+    let length = (headers.get(header::CONTENT_LENGTH))
+        .and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
+    match length {
+        Some(length) if length > limit as u64 => Err(RequestError::TooLarge { limit }),
+        _ => Ok(()),
+    }
+}
+
+async fn read_bytes(body: &mut Body, limits: &RequestLimits) -> Result<Bytes, RequestError> {
+    let timer = BodyTimer::new(limits);
+    let mut bytes = BytesMut::new();
+    while let Some(piece) = timer.next(next_piece(body)).await? {
+        let piece = piece
+            .map_err(|error| RequestError::Malformed(format!("the body broke off: {error}")))?;
+        if bytes.len() + piece.len() > limits.body {
+            return Err(RequestError::TooLarge { limit: limits.body });
+        }
+        bytes.extend_from_slice(&piece);
+    }
+    Ok(bytes.freeze())
+}
+
+async fn next_piece(body: &mut Body) -> Option<Result<Bytes, axum::Error>> {
+    loop {
+        match poll_fn(|cx| Pin::new(&mut *body).poll_frame(cx)).await? {
+            Ok(frame) => {
+                if let Ok(data) = frame.into_data() {
+                    return Some(Ok(data));
+                }
+            }
+            Err(error) => return Some(Err(error)),
+        }
+    }
+}
+
+/// The parts of multipart/form-data: the scan and, if there are any, the parameters.
+async fn split_form<P: Parameters>(
+    parts: Parts,
+    bytes: Bytes,
+) -> Result<(Bytes, Option<P>), RequestError> {
+    let malformed = |error: MultipartError| {
+        RequestError::Malformed(format!("the multipart body: {}", error.body_text()))
+    };
+    let mut request = Request::from_parts(parts, Body::from(bytes));
+    // axum's own limit is 2 MB; the service's limit was applied while the bytes came.
+    DefaultBodyLimit::disable().apply(&mut request);
+    let mut form = (Multipart::from_request(request, &()).await).map_err(|rejection| {
+        RequestError::Malformed(format!("the multipart body: {}", rejection.body_text()))
+    })?;
+    let mut scan = None;
+    let mut parameters = None;
+    while let Some(field) = form.next_field().await.map_err(malformed)? {
+        let name = field.name().unwrap_or_default().to_owned();
+        let media_type = field.content_type().map(essence);
+        let (slot, expected, read): (_, _, &[&str]) = match name.as_str() {
+            "scan" => (&mut scan, SCAN_PART_MEDIA_TYPES, &SCAN_PART_READ),
+            part if part == P::PART => (&mut parameters, JSON, &parameters::MEDIA_TYPES),
+            _ => {
+                return Err(RequestError::Malformed(format!(
+                    "there is no part `{}`; the parts are `scan` and `{}`",
+                    cut(&name, 100),
+                    P::PART
+                )));
+            }
+        };
+        if let Some(media_type) = media_type.filter(|it| !read.contains(&it.as_str())) {
+            return Err(RequestError::UnsupportedMediaType {
+                got: format!("`{}` of part `{name}`", cut(&media_type, 100)),
+                send: expected,
+            });
+        }
+        if slot
+            .replace(field.bytes().await.map_err(malformed)?)
+            .is_some()
+        {
+            return Err(RequestError::Malformed(format!(
+                "the part `{name}` comes twice"
+            )));
+        }
+    }
+    let parameters = parameters.map(|text| P::parse(&text)).transpose()?;
+    Ok((scan.ok_or(RequestError::EmptyBody)?, parameters))
+}
+
+/// The first `limit` characters of a text.
+fn cut(text: &str, limit: usize) -> String {
+    text.chars().take(limit).collect()
+}

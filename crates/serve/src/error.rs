@@ -1,0 +1,224 @@
+//! Every error that a caller can receive, with its row in the contract's table of error codes.
+
+use darn_contract::port::Refusal;
+use darn_contract::{Code, FieldError, JsonError, codes};
+
+use super::{ended_sessions::EndReason, session_store::SessionError};
+
+/// Why a request was not answered.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RequestError {
+    /// The request carries no scan.
+    #[error(
+        "the request carries no scan; send its bytes as the body, or as the part `scan` of multipart/form-data"
+    )]
+    EmptyBody,
+    /// The request cannot be read.
+    #[error("{0}")]
+    Malformed(String),
+    /// No such path.
+    #[error("there is nothing at this path; /openapi.json lists what there is")]
+    NotFound,
+    /// The path has other methods.
+    #[error("this path does not take this method; the header `allow` lists those it takes")]
+    MethodNotAllowed,
+    /// The body came too slowly.
+    #[error(
+        "the body came too slowly: no pause may last longer than {seconds} s (DARN_BODY_TIMEOUT), and the whole no longer than {whole} s"
+    )]
+    BodyTimeout {
+        /// Longest pause, in seconds.
+        seconds: f64,
+        /// Longest time for the whole body, in seconds.
+        whole: f64,
+    },
+    /// The body is larger than the limit.
+    #[error("the body is larger than {limit} bytes, the limit of this service (DARN_BODY_LIMIT)")]
+    TooLarge {
+        /// The limit, in bytes.
+        limit: usize,
+    },
+    /// A message of a stream is larger than the limit.
+    #[error(
+        "a message of the stream is larger than {limit} bytes, the limit; send the scan in several"
+    )]
+    MessageTooLarge {
+        /// The limit, in bytes.
+        limit: usize,
+    },
+    /// The constraints or the query are larger than their own limit.
+    #[error("the {kind} larger than {limit} bytes, the limit")]
+    ParametersTooLarge {
+        /// Which of the two.
+        kind: ParameterKind,
+        /// The limit, in bytes.
+        limit: usize,
+    },
+    /// The request carries no query.
+    #[error("the request carries no query; send it as {place}")]
+    NoQuery {
+        /// Where it is expected.
+        place: &'static str,
+    },
+    /// The content type is not read here.
+    #[error("content type {got} is not read here; send {send}")]
+    UnsupportedMediaType {
+        /// The one received.
+        got: String,
+        /// Those that are read.
+        send: &'static str,
+    },
+    /// The body is compressed.
+    #[error("content encoding `{got}` is not read here; send the body as it is")]
+    ContentEncoding {
+        /// The one received.
+        got: String,
+    },
+    /// Constraints or a query that are invalid whatever the scan.
+    #[error("the {kind} not valid; `errors` names every field")]
+    Invalid {
+        /// Which of the two.
+        kind: ParameterKind,
+        /// Every invalid field.
+        fields: Vec<FieldError>,
+    },
+    /// The mender refused the scan or the constraints. Internal refusals become `Internal`.
+    #[error("{}", .0.detail)]
+    Refused(Refusal),
+    /// The session does not exist or cannot be used.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// Too many jobs wait.
+    #[error(
+        "{waiting} jobs wait and {running} run, which is all this service takes (DARN_QUEUE); try again in {retry_after} s"
+    )]
+    QueueFull {
+        /// Jobs waiting.
+        waiting: usize,
+        /// Jobs running.
+        running: usize,
+        /// Estimated seconds until there is room.
+        retry_after: u64,
+    },
+    /// Too many bodies are being received.
+    #[error(
+        "{limit} requests are being received, which is all this service receives at once (DARN_UPLOADS); try again in {retry_after} s"
+    )]
+    UploadsFull {
+        /// Most bodies received at once.
+        limit: usize,
+        /// Suggested seconds to wait.
+        retry_after: u64,
+    },
+    /// The service shuts down.
+    #[error("the service is shutting down")]
+    Draining,
+    /// The warm-up mend has not finished.
+    #[error("the service is still warming up")]
+    WarmingUp,
+    /// Waiting and running took too long.
+    #[error(
+        "waiting and mending took longer than {seconds} s, the limit of this service (DARN_DEADLINE)"
+    )]
+    Deadline {
+        /// The limit, in seconds.
+        seconds: f64,
+    },
+    /// An error of the service itself; logged, not told.
+    #[error("an error of the service itself; its log has it under this request id")]
+    Internal,
+}
+
+/// The two kinds of request parameters; displayed as the beginning of a sentence.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ParameterKind {
+    /// Constraints of a mend.
+    Constraints,
+    /// The query of an anchor search.
+    Query,
+}
+
+impl std::fmt::Display for ParameterKind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Constraints => "constraints are",
+            Self::Query => "query is",
+        })
+    }
+}
+
+impl RequestError {
+    /// The error of a text that is not the expected message.
+    pub fn of_json(kind: ParameterKind, error: JsonError) -> Self {
+        match error {
+            JsonError::Syntax { detail } => {
+                Self::Malformed(format!("the {kind} not JSON: {detail}"))
+            }
+            JsonError::Shape(field) => Self::Invalid {
+                kind,
+                fields: vec![field],
+            },
+        }
+    }
+
+    /// Its row in the table of error codes.
+    pub fn code(&self) -> Code {
+        match self {
+            Self::EmptyBody => codes::EMPTY_BODY,
+            Self::Malformed(_) => codes::MALFORMED_REQUEST,
+            Self::NotFound => codes::NOT_FOUND,
+            Self::MethodNotAllowed => codes::METHOD_NOT_ALLOWED,
+            Self::BodyTimeout { .. } => codes::BODY_TIMEOUT,
+            Self::TooLarge { .. } => codes::BODY_TOO_LARGE,
+            Self::MessageTooLarge { .. } => codes::MESSAGE_TOO_LARGE,
+            Self::ParametersTooLarge { kind, .. } => match kind {
+                ParameterKind::Constraints => codes::CONSTRAINTS_TOO_LARGE,
+                ParameterKind::Query => codes::QUERY_TOO_LARGE,
+            },
+            Self::NoQuery { .. } => codes::NO_QUERY,
+            Self::ContentEncoding { .. } => codes::UNSUPPORTED_CONTENT_ENCODING,
+            Self::UnsupportedMediaType { .. } => codes::UNSUPPORTED_MEDIA_TYPE,
+            Self::Invalid { kind, .. } => match kind {
+                ParameterKind::Constraints => codes::INVALID_CONSTRAINTS,
+                ParameterKind::Query => codes::INVALID_QUERY,
+            },
+            Self::Refused(refusal) => refusal.code,
+            Self::Session(error) => match error {
+                SessionError::Unknown => codes::SESSION_NOT_FOUND,
+                SessionError::Ended(EndReason::Idle) => codes::SESSION_EXPIRED,
+                SessionError::Ended(EndReason::Evicted) => codes::SESSION_EVICTED,
+                SessionError::Ended(EndReason::Deleted) => codes::SESSION_DELETED,
+                SessionError::Busy { .. } => codes::SESSION_BUSY,
+                SessionError::TooLarge { .. } => codes::SESSION_TOO_LARGE,
+                SessionError::Full { .. } => codes::SESSIONS_FULL,
+            },
+            Self::QueueFull { .. } => codes::QUEUE_FULL,
+            Self::UploadsFull { .. } => codes::UPLOADS_FULL,
+            Self::Draining => codes::DRAINING,
+            Self::WarmingUp => codes::WARMING_UP,
+            Self::Deadline { .. } => codes::DEADLINE_EXCEEDED,
+            Self::Internal => codes::INTERNAL,
+        }
+    }
+
+    /// The fields of the constraints or the query at fault.
+    pub fn fields(&self) -> &[FieldError] {
+        match self {
+            Self::Invalid { fields, .. } => fields,
+            Self::Refused(refusal) => &refusal.fields,
+            _ => &[],
+        }
+    }
+
+    /// After how many seconds the caller should try again; `None` when that would not help.
+    pub fn retry_after(&self) -> Option<u64> {
+        match self {
+            Self::QueueFull { retry_after, .. } | Self::UploadsFull { retry_after, .. } => {
+                Some(*retry_after)
+            }
+            Self::Draining | Self::WarmingUp | Self::Session(SessionError::Full { .. }) => Some(5),
+            Self::Session(SessionError::Busy { .. }) => Some(1),
+            _ => None,
+        }
+    }
+}

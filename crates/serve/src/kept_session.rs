@@ -1,0 +1,90 @@
+//! One kept scan: its calls, who may use it now, and the constraints of its last successful edit.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+
+use darn_contract::port::{Cancellation, EditSession, Mended, PatchForm, Patches, Refusal};
+use darn_contract::{Anchor, Constraints, Edit, Search, v1};
+
+/// Bytes a session takes beside its scan.
+pub(super) const OVERHEAD: usize = 1024;
+
+/// A scan kept for editing, and the constraints of its last successful edit.
+pub struct KeptSession {
+    session: Box<dyn EditSession>,
+    last: Mutex<Constraints>,
+    /// One permit: one request at a time uses the session.
+    exclusive: Arc<Semaphore>,
+}
+
+impl KeptSession {
+    /// A session without constraints yet.
+    pub fn new(session: Box<dyn EditSession>) -> Self {
+        Self {
+            session,
+            last: Mutex::default(),
+            exclusive: Arc::new(Semaphore::new(1)),
+        }
+    }
+
+    /// The session's description; `id` and `idle_seconds` are left empty.
+    pub fn described(&self) -> v1::Session {
+        self.session.described()
+    }
+
+    /// The patches alone. The constraints are remembered if they could be met and the caller still waits for the answer.
+    ///
+    /// # Errors
+    /// The mender's refusal.
+    pub fn patches(
+        &self,
+        constraints: &Constraints,
+        form: PatchForm,
+        cancellation: Cancellation<'_>,
+    ) -> Result<Patches, Refusal> {
+        let patches = self.session.patches(constraints, form, cancellation)?;
+        if !cancellation.is_cancelled() {
+            *self.last() = constraints.clone();
+        }
+        Ok(patches)
+    }
+
+    /// The whole scan, mended with the remembered constraints.
+    ///
+    /// # Errors
+    /// The mender's refusal.
+    pub fn result(&self, cancellation: Cancellation<'_>) -> Result<Mended, Refusal> {
+        let last = self.last().clone();
+        self.session.mended(&last, cancellation)
+    }
+
+    /// Searches the uv of a hole's grid for a point.
+    ///
+    /// # Errors
+    /// The mender's refusal.
+    pub fn optimize_anchor(
+        &self,
+        search: &Search,
+        cancellation: Cancellation<'_>,
+    ) -> Result<v1::AnchorFound, Refusal> {
+        self.session.optimize_anchor(search, cancellation)
+    }
+
+    /// Waits for exclusive use, in order of arrival, until the permit is dropped. Blocks no thread.
+    pub async fn exclusive(&self) -> Option<OwnedSemaphorePermit> {
+        // The semaphore is never closed, so this is never `None`.
+        Arc::clone(&self.exclusive).acquire_owned().await.ok()
+    }
+
+    fn last(&self) -> MutexGuard<'_, Constraints> {
+        self.last.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Memory it takes, in bytes.
+    pub fn bytes(&self) -> usize {
+        let last = self.last();
+        let lists = size_of::<Anchor>() * last.anchors.len() + size_of::<Edit>() * last.edits.len();
+        self.session.bytes().saturating_add(lists + OVERHEAD)
+    }
+}

@@ -1,0 +1,124 @@
+//! What a request sends beside its scan: constraints or an anchor query, how they are named, read and checked.
+
+use serde::de::DeserializeOwned;
+
+use super::{
+    error::{ParameterKind, RequestError},
+    media_types::{JSON, OCTET_STREAM},
+};
+use darn_contract::{Constraints, FieldError, Search, from_json, v1};
+
+/// Largest JSON text of constraints or a query, in bytes.
+pub const MAX_BYTES: usize = 1 << 20;
+/// The media types it is read from. `application/octet-stream` is what curl declares for any file.
+pub const MEDIA_TYPES: [&str; 2] = [JSON, OCTET_STREAM];
+
+/// Constraints or a query, checked.
+pub trait Parameters: Sized {
+    /// Which of the two.
+    const KIND: ParameterKind;
+    /// The name of its part in multipart/form-data, and of its field in the first chunk of a gRPC stream.
+    const PART: &'static str;
+    /// Its message in the contract.
+    type Message: DeserializeOwned;
+
+    /// Checks a message.
+    ///
+    /// # Errors
+    /// Every invalid field.
+    fn check_message(message: &Self::Message) -> Result<Self, Vec<FieldError>>;
+
+    /// Checks a message.
+    ///
+    /// # Errors
+    /// `Invalid`, naming every invalid field.
+    fn from_message(message: &Self::Message) -> Result<Self, RequestError> {
+        Self::check_message(message).map_err(Self::invalid)
+    }
+
+    /// Reads a JSON text and checks it.
+    ///
+    /// # Errors
+    /// `ParametersTooLarge`, `Malformed` or `Invalid`.
+    fn parse(text: &[u8]) -> Result<Self, RequestError> {
+        if text.len() > MAX_BYTES {
+            return Err(RequestError::ParametersTooLarge {
+                kind: Self::KIND,
+                limit: MAX_BYTES,
+            });
+        }
+        let message = from_json(text).map_err(|error| RequestError::of_json(Self::KIND, error))?;
+        Self::from_message(&message)
+    }
+
+    /// The error of these fields.
+    fn invalid(fields: Vec<FieldError>) -> RequestError {
+        RequestError::Invalid {
+            kind: Self::KIND,
+            fields,
+        }
+    }
+}
+
+impl Parameters for Constraints {
+    const KIND: ParameterKind = ParameterKind::Constraints;
+    const PART: &'static str = "constraints";
+    type Message = v1::Constraints;
+
+    fn check_message(message: &v1::Constraints) -> Result<Self, Vec<FieldError>> {
+        Self::check(message)
+    }
+}
+
+impl Parameters for Search {
+    const KIND: ParameterKind = ParameterKind::Query;
+    const PART: &'static str = "query";
+    type Message = v1::AnchorQuery;
+
+    fn check_message(message: &v1::AnchorQuery) -> Result<Self, Vec<FieldError>> {
+        Self::check(message)
+    }
+}
+
+/// Allows only constraints that deform cloth: those of a request to an open session, whose holes and weights are already chosen.
+///
+/// # Errors
+/// `Invalid`, naming the fields that select holes or weights.
+pub fn only_edits(constraints: Constraints) -> Result<Constraints, RequestError> {
+    let mut unexpected = Vec::new();
+    if !constraints.holes.is_empty() {
+        unexpected.push("/holes");
+    }
+    if constraints.weights.is_some() {
+        unexpected.push("/weights");
+    }
+    if constraints.up.is_some() {
+        unexpected.push("/up");
+    }
+    let detail = "chosen when the session was opened; open another for another choice";
+    refuse_fields(&unexpected, detail).map(|()| constraints)
+}
+
+/// Allows only constraints that select holes and weights: those that open a session.
+///
+/// # Errors
+/// `Invalid`, naming the fields that deform cloth.
+pub fn only_selection(constraints: Constraints) -> Result<Constraints, RequestError> {
+    let mut unexpected = Vec::new();
+    if !constraints.anchors.is_empty() {
+        unexpected.push("/anchors");
+    }
+    if !constraints.edits.is_empty() {
+        unexpected.push("/edits");
+    }
+    let detail = "not taken when a session is opened; send it to /sessions/{id}/inpaint";
+    refuse_fields(&unexpected, detail).map(|()| constraints)
+}
+
+fn refuse_fields(pointers: &[&str], detail: &str) -> Result<(), RequestError> {
+    if pointers.is_empty() {
+        return Ok(());
+    }
+    let fields = pointers.iter().map(|at| FieldError::new(*at, detail));
+    Err(Constraints::invalid(fields.collect()))
+}

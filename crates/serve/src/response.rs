@@ -1,0 +1,120 @@
+//! Successful answers: what was mended, alone or with its report in multipart/mixed, and JSON.
+
+use axum::{
+    body::Body,
+    http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header},
+    response::{IntoResponse, Response},
+};
+use serde::Serialize;
+use uuid::Uuid;
+
+use super::media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, OCTET_STREAM};
+use darn_contract::port::{Mended, PatchForm, Patches};
+use darn_contract::v1;
+
+/// How many holes were filled.
+pub const HOLES_FILLED: HeaderName = HeaderName::from_static("darn-holes-filled");
+/// How many boundary loops were left as they were.
+pub const LOOPS_SKIPPED: HeaderName = HeaderName::from_static("darn-loops-skipped");
+/// Largest distance between the cloth and an anchor, those of gestures included, in the scene's unit; absent without anchors.
+pub const ANCHOR_DISTANCE: HeaderName = HeaderName::from_static("darn-anchor-distance");
+
+/// Keeps caches from storing an answer whose content changes.
+const NO_STORE: (HeaderName, &str) = (header::CACHE_CONTROL, "no-store");
+
+/// A message as JSON. Messages of the contract have text keys only, so writing one does not fail.
+pub fn json(message: &impl Serialize) -> Vec<u8> {
+    serde_json::to_vec(message).unwrap_or_default()
+}
+
+/// An answer of JSON already written.
+pub fn json_response(text: Vec<u8>) -> Response {
+    let headers = [(header::CONTENT_TYPE, JSON), NO_STORE];
+    (headers, text).into_response()
+}
+
+/// An answer of what was mended, the whole scan or patches, and its report.
+#[derive(Debug)]
+pub struct MendResponse {
+    /// Name of its part in multipart/mixed.
+    part: &'static str,
+    media_type: &'static str,
+    bytes: Vec<u8>,
+    report: v1::Report,
+}
+
+impl From<Mended> for MendResponse {
+    fn from(mended: Mended) -> Self {
+        let is_binary = mended.bytes.starts_with(b"glTF");
+        Self {
+            part: "scan",
+            media_type: if is_binary { GLB } else { GLTF },
+            bytes: mended.bytes,
+            report: mended.report,
+        }
+    }
+}
+
+impl MendResponse {
+    /// Patches in the given form.
+    pub fn of_patches(patches: Patches, form: PatchForm) -> Self {
+        Self {
+            part: "patches",
+            media_type: match form {
+                PatchForm::Glb => GLB,
+                PatchForm::Positions => OCTET_STREAM,
+            },
+            bytes: patches.bytes,
+            report: patches.report,
+        }
+    }
+
+    /// The answer in the media type that the caller prefers: with its report when that is multipart/mixed, else alone.
+    pub fn render(self, preferred: &str) -> Response {
+        let headers = report_headers(&self.report);
+        let (media_type, body) = if preferred == MULTIPART_MIXED {
+            self.multipart()
+        } else {
+            (self.media_type.to_owned(), self.bytes)
+        };
+        let media_type = [(header::CONTENT_TYPE, media_type)];
+        let body = Body::from(body);
+        (StatusCode::OK, media_type, [NO_STORE], headers, body).into_response()
+    }
+
+    fn multipart(self) -> (String, Vec<u8>) {
+        let boundary = format!("darn-{}", Uuid::new_v4().simple());
+        let report = json(&self.report);
+        let mut body = Vec::with_capacity(self.bytes.len() + report.len() + 512);
+        for (name, media_type, bytes) in [
+            ("report", JSON, &report),
+            (self.part, self.media_type, &self.bytes),
+        ] {
+            let head = format!(
+                "--{boundary}\r\ncontent-disposition: attachment; name=\"{name}\"\r\ncontent-type: {media_type}\r\ncontent-length: {}\r\n\r\n",
+                bytes.len()
+            );
+            body.extend_from_slice(head.as_bytes());
+            body.extend_from_slice(bytes);
+            body.extend_from_slice(b"\r\n");
+        }
+        body.extend_from_slice(format!("--{boundary}--\r\n").as_bytes());
+        (format!("{MULTIPART_MIXED}; boundary={boundary}"), body)
+    }
+}
+
+fn report_headers(report: &v1::Report) -> HeaderMap {
+    let mut headers = HeaderMap::from_iter([
+        (HOLES_FILLED, HeaderValue::from(report.holes.len())),
+        (LOOPS_SKIPPED, HeaderValue::from(report.skipped.len())),
+    ]);
+    let distances = report.holes.iter().flat_map(|hole| {
+        let anchors = hole.anchors.iter().map(|anchor| anchor.distance);
+        anchors.chain(hole.edits.iter().map(|edit| edit.distance))
+    });
+    let largest = distances.reduce(f64::max);
+    if let Some(value) = largest.and_then(|d| HeaderValue::try_from(d.to_string()).ok()) {
+        headers.insert(ANCHOR_DISTANCE, value);
+    }
+    headers
+}

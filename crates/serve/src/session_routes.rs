@@ -1,0 +1,202 @@
+//! The HTTP routes of sessions: a scan is sent once, later requests carry constraints alone.
+
+use std::{sync::Arc, time::Instant};
+
+use axum::{
+    Router,
+    extract::{FromRequestParts, Path, Request, State},
+    http::{StatusCode, header, request::Parts},
+    response::{IntoResponse, Response},
+    routing::{get, post},
+};
+use tokio::task;
+use uuid::Uuid;
+
+use super::{
+    accept::preferred,
+    app::{App, UploadPermit},
+    body::{self, ScanRequest},
+    error::RequestError,
+    media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, OCTET_STREAM},
+    parameters::{self, Parameters},
+    response::{self, MendResponse},
+    session_store::SessionError,
+};
+use darn_contract::port::PatchForm;
+use darn_contract::{Constraints, Search, v1};
+
+/// The routes below `/sessions`.
+pub fn routes() -> Router<Arc<App>> {
+    Router::new()
+        .route("/sessions", post(open))
+        .route("/sessions/{id}", get(describe).delete(delete))
+        .route("/sessions/{id}/inpaint", post(inpaint))
+        .route("/sessions/{id}/optimize-anchor", post(optimize_anchor))
+        .route("/sessions/{id}/result", get(result))
+}
+
+/// The session id in a path.
+struct SessionId(Uuid);
+
+impl<S: Send + Sync> FromRequestParts<S> for SessionId {
+    type Rejection = RequestError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, RequestError> {
+        // A text that is not an id is an unknown session.
+        let unknown = RequestError::Session(SessionError::Unknown);
+        let Ok(Path(text)) = Path::<String>::from_request_parts(parts, state).await else {
+            return Err(unknown);
+        };
+        Uuid::try_parse(&text).map(Self).map_err(|_| unknown)
+    }
+}
+
+async fn open(State(app): State<Arc<App>>, request: Request) -> Result<Response, RequestError> {
+    let ScanRequest {
+        scan,
+        parameters,
+        upload,
+    } = body::receive_scan::<Constraints>(&app, request).await?;
+    let constraints = parameters::only_selection(parameters.unwrap_or_default())?;
+    let (id, sessions) = (Uuid::new_v4(), Arc::clone(&app.sessions));
+    let idle_seconds = sessions.limits().idle.as_secs_f64();
+    let job = app.submit(upload, move |mender, cancellation| {
+        let session = mender.open(scan, &constraints, cancellation)?;
+        let text = session_json(session.described(), id, idle_seconds);
+        Ok((session, text))
+    });
+    // Inserted only while the caller still waits: an abandoned session must not evict another.
+    let (session, text) = job.await?;
+    run_blocking(move || sessions.insert(id, session, Instant::now())).await?;
+    let headers = [
+        (header::CONTENT_TYPE, JSON.to_owned()),
+        (header::LOCATION, format!("/sessions/{id}")),
+    ];
+    Ok((StatusCode::CREATED, headers, text).into_response())
+}
+
+async fn describe(
+    State(app): State<Arc<App>>,
+    SessionId(id): SessionId,
+) -> Result<Response, RequestError> {
+    let upload = session_permit(&app, id)?;
+    let idle_seconds = app.sessions.limits().idle.as_secs_f64();
+    let text = app
+        .submit_to_session(id, upload, move |session, _| {
+            Ok(session_json(session.described(), id, idle_seconds))
+        })
+        .await?;
+    Ok(response::json_response(text))
+}
+
+async fn inpaint(
+    State(app): State<Arc<App>>,
+    SessionId(id): SessionId,
+    request: Request,
+) -> Result<Response, RequestError> {
+    let media_type = preferred(request.headers(), &[GLB, OCTET_STREAM, MULTIPART_MIXED]);
+    // Also the form of the patches inside multipart/mixed.
+    let form = match preferred(request.headers(), &[GLB, OCTET_STREAM]) {
+        OCTET_STREAM => PatchForm::Positions,
+        _ => PatchForm::Glb,
+    };
+    let SessionRequest { parameters, upload } = receive::<Constraints>(&app, id, request).await?;
+    let constraints = parameters::only_edits(parameters.unwrap_or_default())?;
+    let patches = app
+        .submit_to_session(id, upload, move |session, cancellation| {
+            session.patches(&constraints, form, cancellation)
+        })
+        .await?;
+    app.metrics.mended(&patches.report);
+    Ok(MendResponse::of_patches(patches, form).render(media_type))
+}
+
+async fn optimize_anchor(
+    State(app): State<Arc<App>>,
+    SessionId(id): SessionId,
+    request: Request,
+) -> Result<Response, RequestError> {
+    let SessionRequest { parameters, upload } = receive::<Search>(&app, id, request).await?;
+    let place = "the body, application/json";
+    let search = parameters.ok_or(RequestError::NoQuery { place })?;
+    let text = app
+        .submit_to_session(id, upload, move |session, cancellation| {
+            session
+                .optimize_anchor(&search, cancellation)
+                .map(|found| response::json(&found))
+        })
+        .await?;
+    Ok(response::json_response(text))
+}
+
+async fn result(
+    State(app): State<Arc<App>>,
+    SessionId(id): SessionId,
+    request: Request,
+) -> Result<Response, RequestError> {
+    let media_type = preferred(request.headers(), &[GLB, GLTF, MULTIPART_MIXED]);
+    let upload = session_permit(&app, id)?;
+    let mended = app
+        .submit_to_session(id, upload, |session, cancellation| {
+            session.result(cancellation)
+        })
+        .await?;
+    app.metrics.mended(&mended.report);
+    Ok(MendResponse::from(mended).render(media_type))
+}
+
+async fn delete(
+    State(app): State<Arc<App>>,
+    SessionId(id): SessionId,
+) -> Result<StatusCode, RequestError> {
+    app.check_serving()?;
+    let sessions = Arc::clone(&app.sessions);
+    run_blocking(move || sessions.delete(id, Instant::now())).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// A request to an open session.
+struct SessionRequest<P> {
+    /// Checked constraints or query; `None` when the request carries none.
+    parameters: Option<P>,
+    upload: UploadPermit,
+}
+
+/// Takes an upload permit for a request to a session that exists.
+fn session_permit(app: &App, id: Uuid) -> Result<UploadPermit, RequestError> {
+    app.check_serving()?;
+    app.sessions.check(id, Instant::now())?;
+    app.upload_permit()
+}
+
+/// Receives a request to a session that exists.
+async fn receive<P: Parameters>(
+    app: &App,
+    id: Uuid,
+    request: Request,
+) -> Result<SessionRequest<P>, RequestError> {
+    match session_permit(app, id) {
+        Ok(upload) => Ok(SessionRequest {
+            parameters: body::read_parameters(request, &app.limits).await?,
+            upload,
+        }),
+        Err(error) => {
+            body::discard(request, &app.limits);
+            Err(error)
+        }
+    }
+}
+
+/// Runs `work` on a thread that may block: freeing a large session takes long.
+async fn run_blocking(
+    work: impl FnOnce() -> Result<(), SessionError> + Send + 'static,
+) -> Result<(), RequestError> {
+    let done = task::spawn_blocking(work).await;
+    Ok(done.map_err(|_| RequestError::Internal)??)
+}
+
+fn session_json(mut session: v1::Session, id: Uuid, idle_seconds: f64) -> Vec<u8> {
+    session.id = id.to_string();
+    session.idle_seconds = idle_seconds;
+    response::json(&session)
+}
