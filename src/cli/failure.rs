@@ -2,14 +2,15 @@
 
 use darn_contract::error_chain;
 use std::error::Error;
-use std::fmt;
 
 /// Why a command failed.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum Failure {
     /// Wrong usage or settings; exit 64.
+    #[error("{0}")]
     Usage(String),
     /// The work failed; exit 1.
+    #[error("cannot {doing}: {}", error_chain(.cause.as_ref()))]
     Failed {
         /// What was being done; completes "cannot …".
         doing: String,
@@ -24,17 +25,6 @@ impl Failure {
         match self {
             Self::Usage(_) => super::USAGE,
             Self::Failed { .. } => 1,
-        }
-    }
-}
-
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Usage(what) => f.write_str(what),
-            Self::Failed { doing, cause } => {
-                write!(f, "cannot {doing}: {}", error_chain(cause.as_ref()))
-            }
         }
     }
 }

@@ -19,6 +19,7 @@ pub struct HealthcheckArgs {
     patience: u64,
 }
 
+/// Runs `darn healthcheck`.
 pub fn run(args: &HealthcheckArgs) -> Result<(), Failure> {
     darn_serve::healthcheck(args.listen, Duration::from_secs(args.patience))
         .or_fail("see the service ready")?;

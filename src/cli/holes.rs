@@ -15,6 +15,7 @@ pub struct HolesArgs {
     json: bool,
 }
 
+/// Runs `darn holes`.
 pub fn run(args: &HolesArgs) -> Result<(), Failure> {
     let bytes = files::read(&args.scan)?;
     let name = args.scan.display();

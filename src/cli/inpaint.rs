@@ -29,6 +29,7 @@ pub struct InpaintArgs {
     network: NetworkArgs,
 }
 
+/// Runs `darn inpaint`.
 pub fn run(args: &InpaintArgs) -> Result<(), Failure> {
     let name = args.scan.display();
     let progress = WorkProgress::staged("darn");

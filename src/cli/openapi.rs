@@ -3,6 +3,7 @@
 use super::failure::{Failure, OrFail};
 use std::io::Write;
 
+/// Runs `darn openapi`.
 pub fn run() -> Result<(), Failure> {
     let mut text = serde_json::to_string_pretty(&darn_serve::openapi::document())
         .or_fail("write the document")?;

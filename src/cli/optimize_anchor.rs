@@ -35,6 +35,7 @@ pub struct OptimizeAnchorArgs {
     network: NetworkArgs,
 }
 
+/// Runs `darn optimize-anchor`.
 pub fn run(args: &OptimizeAnchorArgs) -> Result<(), Failure> {
     let name = args.scan.display();
     let progress = WorkProgress::staged("darn");

@@ -32,6 +32,7 @@ pub struct RenderArgs {
     wireframe: bool,
 }
 
+/// Runs `darn render`.
 pub fn run(args: &RenderArgs) -> Result<(), Failure> {
     let bytes = files::read(&args.scan)?;
     let scan = Scan::read(bytes, &ScanLimits::default())

@@ -7,6 +7,7 @@ use darn_mend::{NetworkMender, SharedMender};
 use darn_serve::start_logging;
 use std::sync::Arc;
 
+/// Runs `darn serve`.
 pub fn run(settings: &ServeCommand) -> Result<(), Failure> {
     let serve = &settings.serve;
     start_logging(&serve.log, serve.log_format)

@@ -19,8 +19,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let welded = weld(&holed_sheet(40, 0.2));
     let topology = welded.topology();
     let loops = boundary_loops(&welded.mesh, &topology);
-    let hole = loops.iter().position(|l| l.kind == LoopKind::Hole);
-    let hole = hole.ok_or("the sheet has no hole")?;
+    let hole = loops.iter().find(|l| l.kind == LoopKind::Hole);
+    let hole = hole.ok_or("the sheet has no hole")?.id;
     let region = grow(&welded.mesh, &topology, &loops, hole, REACH)?;
 
     // 2. The chart of the region, sampled on a grid.

@@ -49,7 +49,7 @@ pub(super) fn patch_influences(
         faces: Vec::new(),
     };
     let nearest = |at: &[f32; 3]| {
-        let (vertex, _) = closest_vertex(&rim, &position(at))?;
+        let vertex = closest_vertex(&rim, &position(at))?;
         known.get(vertex as usize).copied()
     };
     let of_points = own.iter().zip(positions).map(|(own, at)| {

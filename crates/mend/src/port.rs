@@ -19,10 +19,9 @@ pub struct SharedMender(pub Arc<NetworkMender>);
 
 impl SharedMender {
     /// A scan, and how long reading it took.
-    fn scan(&self, bytes: &[u8]) -> Result<(Scan, Duration), Refusal> {
+    fn scan(&self, bytes: Bytes) -> Result<(Scan, Duration), Refusal> {
         let started = Instant::now();
-        let scan =
-            Scan::read(bytes.to_vec(), &self.0.scan_limits).map_err(|error| of_scan(&error))?;
+        let scan = Scan::read(bytes, &self.0.scan_limits).map_err(|error| of_scan(&error))?;
         Ok((scan, started.elapsed()))
     }
 
@@ -41,7 +40,7 @@ impl Mender for SharedMender {
         constraints: &Constraints,
         cancellation: Cancellation<'_>,
     ) -> Result<Mended, Refusal> {
-        let (scan, read) = self.scan(&scan)?;
+        let (scan, read) = self.scan(scan)?;
         let mut mended =
             super::mend(&scan, constraints, self.call(cancellation)).map_err(of_mend)?;
         add_read_time(&mut mended.report.timings, read);
@@ -54,7 +53,7 @@ impl Mender for SharedMender {
         search: &Search,
         cancellation: Cancellation<'_>,
     ) -> Result<v1::AnchorFound, Refusal> {
-        let (scan, _) = self.scan(&scan)?;
+        let (scan, _) = self.scan(scan)?;
         super::optimize_anchor(&scan, search, self.call(cancellation)).map_err(of_mend)
     }
 
@@ -64,7 +63,7 @@ impl Mender for SharedMender {
         search: &Search,
         cancellation: Cancellation<'_>,
     ) -> Result<Mended, Refusal> {
-        let (scan, read) = self.scan(&scan)?;
+        let (scan, read) = self.scan(scan)?;
         let mut mended =
             super::mend_to_target(&scan, search, self.call(cancellation)).map_err(of_mend)?;
         add_read_time(&mut mended.report.timings, read);
@@ -77,13 +76,13 @@ impl Mender for SharedMender {
         constraints: &Constraints,
         cancellation: Cancellation<'_>,
     ) -> Result<Box<dyn EditSession>, Refusal> {
-        let (scan, _) = self.scan(&scan)?;
+        let (scan, _) = self.scan(scan)?;
         let session = ScanSession::open(scan, constraints, Arc::clone(&self.0), cancellation);
         Ok(Box::new(session.map_err(of_mend)?))
     }
 
     fn find_holes(&self, scan: Bytes) -> Result<v1::HolesReport, Refusal> {
-        let (scan, read) = self.scan(&scan)?;
+        let (scan, read) = self.scan(scan)?;
         let mut found = super::find_holes(&scan);
         add_read_time(&mut found.timings, read);
         Ok(found)

@@ -51,7 +51,7 @@ pub fn select(
     let mut chosen: BTreeMap<u32, Chosen> = BTreeMap::new();
     if constraints.holes.is_empty() {
         let fillable = (cloth.loops.iter()).filter(|l| reason_to_skip(scan, cloth, l).is_none());
-        chosen.extend(fillable.map(|l| (l.id, Chosen::loop_of(l.id))));
+        chosen.extend(fillable.map(|l| (l.id.0, Chosen::loop_of(l.id.0))));
     }
     for (i, selector) in constraints.holes.iter().enumerate() {
         match find(scan, cloth, selector) {

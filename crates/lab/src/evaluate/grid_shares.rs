@@ -65,7 +65,7 @@ fn of_mesh(mesh: &TriMesh) -> Option<GridShares> {
     let holes = loops.iter().filter(|l| l.kind == LoopKind::Hole);
     let rim = holes.max_by(|a, b| a.length.total_cmp(&b.length))?;
     let flatten_with = |reach: f64| {
-        let region = grow(mesh, &topology, &loops, rim.id as usize, reach).ok()?;
+        let region = grow(mesh, &topology, &loops, rim.id, reach).ok()?;
         let chart = flatten::flatten(&region, &FlattenLimits::default()).ok()?;
         Some((region, chart))
     };

@@ -14,6 +14,8 @@ use super::hole_kind::{HoleKind, SCAN_SIDE};
 use crate::scarffolds::holed_scan::{HoledScan, holed_scan};
 use crate::scarffolds::sheets::SimulatedSheet;
 use darn_geometry::mesh::curvature::{angle_defect, face_areas, vertex_normals};
+use darn_geometry::mesh::index::VertexId;
+use darn_geometry::mesh::index::VertexId;
 use darn_geometry::mesh::intersect::intersections_with;
 use darn_geometry::mesh::topology::Topology;
 use darn_geometry::mesh::{TriMesh, Vec3};
@@ -213,7 +215,7 @@ fn curvature(patch: &TriMesh) -> f64 {
         .collect();
     let sum: f64 = inner
         .iter()
-        .map(|v| angle_defect(patch, &topology, *v).abs())
+        .map(|v| angle_defect(patch, &topology, VertexId(*v)).abs())
         .sum();
     sum / inner.len().max(1) as f64
 }
