@@ -66,6 +66,7 @@ struct BenchMendArgs {
     network: NetworkArgs,
 }
 
+/// Runs `darn bench`.
 pub fn run(args: &BenchArgs) -> Result<(), Failure> {
     match &args.command {
         BenchCommand::Net(args) => net(args),

@@ -5,8 +5,6 @@
 //! [`engine`], or one of burn's backends, which `darn-lab` provides. This crate knows neither scene space nor constraints, and reads no
 //! files.
 
-#![warn(missing_docs)]
-
 mod anchor;
 pub mod config;
 pub mod engine;

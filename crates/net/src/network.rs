@@ -179,7 +179,7 @@ impl Network {
             let prediction = self
                 .forward
                 .predict(&GridPlanes::new(config, chunk, &frames))?;
-            let each = answer.chunks_exact(3 * CELLS).zip(&frames);
+            let each = prediction.chunks_exact(3 * CELLS).zip(&frames);
             predictions.extend(each.map(|(planes, frame)| {
                 let inside = cells(planes).into_iter();
                 inside.map(|p| frame.leave(p)).collect::<Vec<_>>()
