@@ -11,7 +11,7 @@ use darn_geometry::mesh::weld::weld;
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
 use darn_geometry::patch::{self, Firmness, PatchOptions, Pull};
 use darn_gltf_scan::Scan;
-use darn_net::engine::{Engine, EngineOptions, Gradient, Input, Isa, Scratch};
+use darn_net::engine::{Engine, EngineInput, EngineOptions, InputGradient, Isa, Scratch};
 use darn_net::weights;
 
 /// The hole of the example scan with the region around it, its chart and its grid.
@@ -103,7 +103,7 @@ fn network(c: &mut Criterion) {
             let known: Vec<f32> = (0..count * CELLS)
                 .map(|k| f32::from(u8::from(k % 64 < 40)))
                 .collect();
-            let input = Input {
+            let input = EngineInput {
                 positions: &x,
                 known: &known,
                 base: None,
@@ -117,7 +117,7 @@ fn network(c: &mut Criterion) {
             let (mut by_positions, mut by_known) = (x.clone(), known.clone());
             c.bench_function(&format!("{name}, gradient"), |b| {
                 b.iter(|| {
-                    let out = Gradient {
+                    let out = InputGradient {
                         prediction: &mut out,
                         by_positions: &mut by_positions,
                         by_known: &mut by_known,

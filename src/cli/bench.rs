@@ -10,7 +10,7 @@ use darn_geometry::grid::{CELLS, NormalGrid, SIDE};
 use darn_gltf_scan::{Scan, ScanLimits};
 #[cfg(feature = "burn")]
 use darn_lab::unet::{BackendKind, load_network};
-use darn_net::engine::{Engine, EngineOptions, Gradient, Input, Isa, Scratch};
+use darn_net::engine::{Engine, EngineInput, EngineOptions, InputGradient, Isa, Scratch};
 use darn_net::{Averaging, FillRequest, NetError, Network, UnetConfig, weights};
 use serde_json::json;
 use std::path::PathBuf;
@@ -231,7 +231,7 @@ fn engine_passes<'a>(engine: &'a Engine, pool: &'a rayon::ThreadPool, batch: usi
     let (x, k) = (planes.clone(), known.clone());
     let (mut scratch, mut out) = (Scratch::default(), vec![0.0; planes.len()]);
     let forward = move || {
-        let input = Input {
+        let input = EngineInput {
             positions: &x,
             known: &k,
             base: None,
@@ -242,14 +242,14 @@ fn engine_passes<'a>(engine: &'a Engine, pool: &'a rayon::ThreadPool, batch: usi
     let mut scratch = Scratch::default();
     let mut outs = [planes.len(), planes.len(), known.len()].map(|size| vec![0.0; size]);
     let gradient = move || {
-        let input = Input {
+        let input = EngineInput {
             positions: &planes,
             known: &known,
             base: None,
             up: None,
         };
         let [prediction, by_positions, by_known] = &mut outs;
-        let out = Gradient {
+        let out = InputGradient {
             prediction,
             by_positions,
             by_known,

@@ -1,35 +1,43 @@
-//! What the network sees in unknown cells: zeros (the paper), a smooth membrane over the known cells, or a thin plate.
+//! What the network sees in unknown cells: zeros (the paper), a membrane over the known cells, or a thin plate.
 //!
-//! The membrane is a push–pull pyramid with a few Jacobi sweeps per level: close to the harmonic fill, and differentiable in the
-//! positions and in a soft mask. The engine computes it in `engine::membrane`; the definition in burn is in `darn-lab`.
+//! The membrane is a push–pull pyramid with a few Jacobi sweeps per level. It is close to the harmonic fill, and differentiable in the
+//! positions and in a soft mask. `engine::membrane` computes it; `darn-lab` has its definition in burn.
 
 use serde::{Deserialize, Serialize};
 
 use darn_geometry::mesh::Vec3;
 use darn_geometry::smooth::{Smooth, smooth_all};
 
-/// What unknown cells hold when the network sees them.
+/// What the network sees in unknown cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum InputKind {
-    /// Zeros, and the network answers with positions (the paper).
+    /// Zeros; the network predicts positions (the paper).
     Zeros,
-    /// The membrane, and the network answers with what to add to it.
+    /// The membrane; the network predicts offsets from it.
     Membrane,
-    /// A thin plate over what the scan knows, with anchors laid over it by the membrane of their distance from it; the network answers
-    /// with what to add. On held-out sheets the plate is half as far from the truth as the membrane.
+    /// A thin plate over the scan's known cells, plus the membrane of the anchors' distances from it; the network predicts offsets from
+    /// the sum. On held-out sheets the plate is half as far from the truth as the membrane.
     #[default]
     Plate,
 }
 
-/// The fill of [`InputKind::Plate`] in every cell that is not known, known cells as they are; the network's units in any frame.
+impl InputKind {
+    /// Whether the network predicts offsets from what it sees, not positions.
+    #[inline]
+    pub fn answers_offsets(self) -> bool {
+        self != InputKind::Zeros
+    }
+}
+
+/// A grid's positions, with the unknown cells filled by a thin plate over the known ones; in the network's units, in any frame.
 ///
-/// `None` when too few cells are known to determine it.
+/// `None` when too few cells are known to determine a plate.
 pub fn plate(positions: &[[f32; 3]], known: &[bool]) -> Option<Vec<[f32; 3]>> {
     plates(&[positions], known)?.pop()
 }
 
-/// [`plate`] of several grids of which the same cells are known, for little more than the work of one.
+/// [`plate`] of several grids with the same known cells; takes little longer than one.
 pub fn plates(grids: &[&[[f32; 3]]], known: &[bool]) -> Option<Vec<Vec<[f32; 3]>>> {
     let wide = |p: &[f32; 3]| Vec3::from(p.map(f64::from));
     let grids: Vec<Vec<Vec3>> = (grids.iter())
@@ -42,10 +50,10 @@ pub fn plates(grids: &[&[[f32; 3]]], known: &[bool]) -> Option<Vec<Vec<[f32; 3]>
     Some(filled.iter().map(narrow).collect())
 }
 
-/// Sweeps at the levels of side 64, 32, 16, 8, 4, 2. On scarves with holes of 10 to 36 cells these leave a quarter of a cell (RMS)
-/// to the converged harmonic fill, which itself is 2 cells from the truth; four each leave half a cell.
+/// Sweeps at the levels of side 64, 32, 16, 8, 4, 2. On scarves with holes of 10 to 36 cells, the result is a quarter of a cell (RMS)
+/// from the converged harmonic fill, which itself is 2 cells from the truth; with four sweeps each it is half a cell.
 pub const SWEEPS: [usize; 6] = [8, 16, 16, 16, 8, 4];
-/// A coarse cell counts as known when this share of it is; a quarter means one cell of the finer level.
+/// A coarse cell counts as wholly known when one part in this many of it is known: one of its four cells at the finer level.
 pub const SATURATION: f32 = 4.0;
-/// Guards the mean of a coarse cell that holds nothing known.
+/// Keeps the mean of a coarse cell finite when nothing in it is known.
 pub const NOTHING: f32 = 1e-6;

@@ -1,42 +1,43 @@
-//! The frame a grid's positions are given in before the network sees them.
-//! Cloth has no preferred direction in space, so a network for any direction should not have to learn all of them: the canonical
-//! frame turns the known cells onto the chart as well as one rotation can (orthogonal Procrustes, Schönemann 1966).
+//! The frame that a grid's positions are turned to before the network sees them.
+//!
+//! Cloth has no preferred direction in space, and the network need not learn all directions: the canonical frame turns the known cells
+//! as close to the chart as one rotation can (orthogonal Procrustes, Schönemann 1966).
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use darn_geometry::grid::{NormalGrid, cell_centre};
 
-/// Which frame a network was trained in.
+/// The frame a network was trained in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FrameKind {
     /// As given.
     Given,
-    /// Turned so that x runs along u and y along v, as well as the known cells allow.
+    /// Turned so that x runs along u and y along v, as far as the known cells allow.
     #[default]
     Canonical,
-    /// As canonical, and the network is told where up is: +z of the given frame, in three channels more.
+    /// As canonical, and three more channels give the network the up direction, +z of the given frame.
     Hanging,
 }
 
 impl FrameKind {
-    /// Whether a network of this frame wants +z to be up in what it is given.
+    /// Whether +z must be up in the grids that a network of this frame is given.
     pub fn knows_up(self) -> bool {
         self != FrameKind::Canonical
     }
 
-    /// Whether a network of this frame is told where up is.
+    /// Whether a network of this frame is given the up direction.
     pub fn told_up(self) -> bool {
         self == FrameKind::Hanging
     }
 
-    /// Whether the grid is turned before the network sees it.
+    /// Whether grids are turned before a network of this frame sees them.
     pub fn turns(self) -> bool {
         self != FrameKind::Given
     }
 
-    /// Channels of what the network sees: positions, mask, and up.
+    /// Channels of the network's input: positions, mask, and up.
     pub fn channels(self) -> usize {
         match self {
             FrameKind::Given | FrameKind::Canonical => 4,
@@ -50,7 +51,7 @@ impl FrameKind {
 pub struct NetworkFrame(Matrix3<f64>);
 
 impl NetworkFrame {
-    /// The frame of a grid; the identity when its known cells do not determine one (none known, or all in one place).
+    /// The rotation for a grid; the identity if its known cells do not determine one (none are known, or all are in one place).
     pub fn of(kind: FrameKind, grid: &NormalGrid) -> NetworkFrame {
         match kind {
             FrameKind::Given => NetworkFrame(Matrix3::identity()),
@@ -60,17 +61,19 @@ impl NetworkFrame {
         }
     }
 
-    /// A position in the network's frame.
+    /// A position of the given frame, in the network's frame.
+    #[inline]
     pub fn enter(&self, p: [f32; 3]) -> [f32; 3] {
         array(self.0 * vector(p))
     }
 
-    /// The given frame's +z, in the network's.
+    /// The given frame's +z, in the network's frame.
     pub fn up(&self) -> [f32; 3] {
         self.enter([0.0, 0.0, 1.0])
     }
 
-    /// A position of the network's frame, in the given one.
+    /// A position of the network's frame, in the given frame.
+    #[inline]
     pub fn leave(&self, p: [f32; 3]) -> [f32; 3] {
         array(self.0.tr_mul(&vector(p)))
     }

@@ -1,8 +1,8 @@
 //! The networks that a service has loaded, by name.
 
-use crate::Network;
+use crate::network::Network;
 
-/// Loaded networks; never empty, and no two of the same name.
+/// Loaded networks; at least one.
 #[derive(Debug)]
 pub struct Networks {
     default: Network,
@@ -10,24 +10,24 @@ pub struct Networks {
 }
 
 impl Networks {
-    /// Networks of which the first is used where nobody chooses; of several with one name, the first counts. The
-    /// others are prepared when first asked.
+    /// Prepares the default network now; the others are prepared at their first prediction. Of several networks with one name, the first
+    /// is used.
     pub fn new(default: Network, others: Vec<Network>) -> Networks {
         default.prepare();
         Networks { default, others }
     }
 
-    /// The one used where nobody chooses.
+    /// The network of requests that name none.
     pub fn default(&self) -> &Network {
         &self.default
     }
 
-    /// The one of this name.
+    /// The network of this name.
     pub fn get(&self, name: &str) -> Option<&Network> {
         self.all().find(|network| network.card().name == name)
     }
 
-    /// All names, the default's first.
+    /// All names, that of the default first.
     pub fn names(&self) -> Vec<&str> {
         self.all().map(|n| n.card().name.as_str()).collect()
     }

@@ -1,48 +1,49 @@
-//! The network again, slowly and plainly, in f64: what the engine is tested against. Written after `unet.rs`, `norm.rs` and `fill.rs`;
-//! planes of channels, one loop an axis, nothing folded.
+//! The network a second time, in f64 with plain loops and unfused batch norm: the oracle of the engine's tests.
+//!
+//! It proves more than a comparison with burn's model: in f64, difference quotients with steps of 1e-9 are accurate enough to test the
+//! engine's gradients, and the tests of this crate need no burn. The tests of `darn-lab` compare burn's loss of the anchor search with it.
 
-use crate::config::{INPUT_SCALE, OUTPUT_SCALE};
-use crate::fill::{NOTHING, SATURATION, SWEEPS};
-use crate::weights::NamedTensors;
-use crate::{InputKind, UnetConfig};
+use crate::config::{INPUT_SCALE, OUTPUT_SCALE, UnetConfig};
+use crate::fill::{InputKind, NOTHING, SATURATION, SWEEPS};
+use crate::tensors::NamedTensors;
 use darn_geometry::grid::{CELLS, SIDE};
 
-/// Channels of square planes.
+/// The channels of one image, each a square plane.
 #[derive(Clone)]
-pub struct Planes {
+struct ChannelPlanes {
     side: usize,
     planes: Vec<Vec<f64>>,
 }
 
-impl Planes {
-    fn map(mut self, f: impl Fn(f64) -> f64) -> Planes {
+impl ChannelPlanes {
+    fn map(mut self, f: impl Fn(f64) -> f64) -> ChannelPlanes {
         self.planes.iter_mut().flatten().for_each(|x| *x = f(*x));
         self
     }
 
-    fn relu(self) -> Planes {
+    fn relu(self) -> ChannelPlanes {
         self.map(|x| x.max(0.0))
     }
 
-    fn concat(mut self, other: Planes) -> Planes {
+    fn concat(mut self, other: ChannelPlanes) -> ChannelPlanes {
         self.planes.extend(other.planes);
         self
     }
 
-    fn add(mut self, other: &Planes) -> Planes {
+    fn add(mut self, other: &ChannelPlanes) -> ChannelPlanes {
         let others = other.planes.iter().flatten();
         let all = self.planes.iter_mut().flatten();
         all.zip(others).for_each(|(x, y)| *x += y);
         self
     }
 
-    /// Every cell from all cells, by channel and place.
-    fn remap(self, side: usize, f: impl Fn(&[f64], usize, usize) -> f64) -> Planes {
+    /// Planes of another side: `f` gives a cell from its channel's plane, row and column.
+    fn remap(self, side: usize, f: impl Fn(&[f64], usize, usize) -> f64) -> ChannelPlanes {
         let cells = |plane: &Vec<f64>| {
             let cells = (0..side * side).map(|at| f(plane, at / side, at % side));
             cells.collect()
         };
-        Planes {
+        ChannelPlanes {
             side,
             planes: self.planes.iter().map(cells).collect(),
         }
@@ -50,18 +51,20 @@ impl Planes {
 }
 
 /// A network by its tensors.
-pub struct Reference<'a> {
+pub struct ReferenceNetwork<'a> {
+    /// All tensors of the network.
     pub tensors: &'a NamedTensors,
+    /// Its architecture.
     pub config: UnetConfig,
 }
 
-impl Reference<'_> {
+impl ReferenceNetwork<'_> {
     fn values(&self, name: &str) -> &[f32] {
         &self.tensors[name].1
     }
 
     /// A convolution of the tensor's own size, and its bias where it has one.
-    fn conv(&self, name: &str, x: Planes) -> Planes {
+    fn conv(&self, name: &str, x: ChannelPlanes) -> ChannelPlanes {
         let (shape, weights) = &self.tensors[&format!("{name}.weight")];
         let (from, size) = (shape[1], shape[2]);
         let bias = self.tensors.get(&format!("{name}.bias"));
@@ -87,13 +90,13 @@ impl Reference<'_> {
             }
             out
         };
-        Planes {
+        ChannelPlanes {
             side: x.side,
             planes: (0..shape[0]).map(plane).collect(),
         }
     }
 
-    fn norm(&self, name: &str, mut x: Planes) -> Planes {
+    fn norm(&self, name: &str, mut x: ChannelPlanes) -> ChannelPlanes {
         let value = |part: &str, c: usize| f64::from(self.values(&format!("{name}.{part}"))[c]);
         for (c, plane) in x.planes.iter_mut().enumerate() {
             let deviation = (value("variance", c) + 1e-5).sqrt();
@@ -104,16 +107,16 @@ impl Reference<'_> {
         x
     }
 
-    fn block(&self, name: &str, x: Planes) -> Planes {
-        let half = |i: usize, x: Planes| {
+    fn block(&self, name: &str, x: ChannelPlanes) -> ChannelPlanes {
+        let half = |i: usize, x: ChannelPlanes| {
             let x = self.conv(&format!("{name}.conv{i}"), x);
             self.norm(&format!("{name}.norm{i}"), x).relu()
         };
         half(1, half(0, x))
     }
 
-    fn gate(&self, name: &str, skip: Planes, signal: Planes) -> Planes {
-        let part = |part: &str, x: Planes| {
+    fn gate(&self, name: &str, skip: ChannelPlanes, signal: ChannelPlanes) -> ChannelPlanes {
+        let part = |part: &str, x: ChannelPlanes| {
             let x = self.conv(&format!("{name}.{part}"), x);
             self.norm(&format!("{name}.{part}_norm"), x)
         };
@@ -128,7 +131,7 @@ impl Reference<'_> {
         skip
     }
 
-    fn up(&self, name: &str, x: Planes, skip: Planes) -> Planes {
+    fn up(&self, name: &str, x: ChannelPlanes, skip: ChannelPlanes) -> ChannelPlanes {
         let from = x.side;
         let x = x.remap(skip.side, |p, r, c| p[r / 2 * from + c / 2]);
         let x = self.conv(&format!("{name}.conv"), x);
@@ -137,7 +140,7 @@ impl Reference<'_> {
         self.block(&format!("{name}.block"), skip.concat(x))
     }
 
-    fn forward(&self, mut x: Planes) -> Planes {
+    fn forward(&self, mut x: ChannelPlanes) -> ChannelPlanes {
         let mut skips = Vec::new();
         for level in 0..5 {
             if level > 0 {
@@ -159,27 +162,27 @@ impl Reference<'_> {
         self.conv("last", x)
     }
 
-    /// `Unet::predict` of one grid without a base: three planes and a mask to three planes.
+    /// The prediction `[3, 64, 64]` for one grid of positions `[3, 64, 64]` and mask `[1, 64, 64]` without a base.
     pub fn predict(&self, positions: &[f64], known: &[f64]) -> Vec<f64> {
         self.predict_over(&vec![0.0; positions.len()], positions, known)
     }
 
-    /// `Unet::predict` of one grid: two times three planes and a mask to three planes.
+    /// The prediction for one grid with a base `[3, 64, 64]`.
     pub fn predict_over(&self, base: &[f64], positions: &[f64], known: &[f64]) -> Vec<f64> {
         let off: Vec<f64> = positions.iter().zip(base).map(|(x, b)| x - b).collect();
         let given = |axis: usize| off[axis * CELLS..][..CELLS].to_vec();
-        let mask = Planes {
+        let mask = ChannelPlanes {
             side: SIDE,
             planes: vec![known.to_vec()],
         };
-        let mut filled = Planes {
+        let mut filled = ChannelPlanes {
             side: SIDE,
             planes: (0..3).map(given).collect(),
         };
         for (axis, plane) in filled.planes.iter_mut().enumerate() {
             match self.config.input {
                 InputKind::Membrane | InputKind::Plate => {
-                    let over = membrane(plane, known, 0);
+                    let over = membrane(plane, known);
                     let base = &base[axis * CELLS..][..CELLS];
                     *plane = over.iter().zip(base).map(|(x, b)| x + b).collect();
                 }
@@ -198,12 +201,13 @@ impl Reference<'_> {
     }
 }
 
-/// The membrane of one plane, from the finest level down.
-pub fn membrane(positions: &[f64], known: &[f64], level: usize) -> Vec<f64> {
+/// The membrane of one plane of positions.
+pub fn membrane(positions: &[f64], known: &[f64]) -> Vec<f64> {
     let values: Vec<f64> = positions.iter().zip(known).map(|(x, k)| x * k).collect();
-    pyramid(&values, known, level)
+    pyramid(&values, known, 0)
 }
 
+/// The fill of one plane at a level, given its values times their weights.
 fn pyramid(values: &[f64], weight: &[f64], level: usize) -> Vec<f64> {
     let side = SIDE >> level;
     let share: Vec<f64> = weight

@@ -1,22 +1,25 @@
-//! What computes a network's answers: the seam between [`Network`](crate::Network) and its engines.
+//! The interface between [`Network`](crate::Network) and what computes its predictions, and its implementation by darn's own engine.
 
 use std::fmt;
 use std::sync::{Mutex, PoisonError};
 
-use crate::engine::{self, Cotangent, Engine, Gradient, Scratch};
-use crate::weights::NamedTensors;
-use crate::{AnchorLoss, AnchorProblem, GridPlanes, NetError, UnetConfig, anchor};
+use crate::anchor::{AnchorBatch, AnchorLoss, AnchorProblem};
+use crate::config::UnetConfig;
+use crate::engine::{Engine, EngineOptions, InputGradient, Scratch};
+use crate::error::NetError;
+use crate::planes::GridPlanes;
+use crate::tensors::NamedTensors;
 
-/// A network on some engine. Called from many threads at once.
+/// What computes a network's predictions. It is called from many threads at once.
 pub trait Runtime: fmt::Debug + Send + Sync {
-    /// Does now what the first prediction would do otherwise.
+    /// Packs the weights now instead of at the first prediction.
     fn prepare(&self) {}
 
-    /// Predicts all cells of what is shown: `[n, 3, 64, 64]`, in the network's units and frame.
+    /// Predicts all cells of some grids: `[n, 3, 64, 64]`, in the network's units and frame.
     ///
     /// # Errors
-    /// Planes of another size.
-    fn predict(&self, shown: &GridPlanes) -> Result<Vec<f32>, NetError>;
+    /// Planes whose lengths are not those of the same number of grids.
+    fn predict(&self, input: &GridPlanes) -> Result<Vec<f32>, NetError>;
 
     /// The anchor loss at uvs.
     ///
@@ -39,30 +42,22 @@ pub trait Runtime: fmt::Debug + Send + Sync {
     ) -> Result<Vec<AnchorLoss>, NetError>;
 }
 
-/// darn's own engine for many threads: one set of packed weights, and scratch buffers that calls reuse instead of allocating.
+/// darn's own engine, with one set of packed weights for all threads and a pool of [`Scratch`] buffers for their calls.
 #[derive(Debug)]
 pub struct EngineRuntime {
     engine: Engine,
     idle: Mutex<Vec<Scratch>>,
 }
 
-/// Predictions, and the derivative of a scalar by the mask.
-pub(crate) struct MaskGradient {
-    /// `[n, 3, 64, 64]`.
-    pub predictions: Vec<f32>,
-    /// `[n, 1, 64, 64]`.
-    pub by_mask: Vec<f32>,
-}
-
 impl EngineRuntime {
     /// An engine for a network's tensors.
     ///
     /// # Errors
-    /// What [`Engine::new`] refuses.
+    /// Those of [`Engine::new`].
     pub fn new(
         tensors: &NamedTensors,
         config: &UnetConfig,
-        options: engine::EngineOptions,
+        options: EngineOptions,
     ) -> Result<EngineRuntime, NetError> {
         Ok(EngineRuntime {
             engine: Engine::new(tensors, config, options)?,
@@ -70,46 +65,13 @@ impl EngineRuntime {
         })
     }
 
-    pub(crate) fn predict_planes(&self, shown: &GridPlanes) -> Result<Vec<f32>, NetError> {
-        let mut out = vec![0.0; 3 * shown.known.len()];
-        let mut scratch = self.scratch();
-        self.engine
-            .predict(&mut scratch, shown.as_input(), &mut out)?;
-        self.lock().push(scratch);
-        Ok(out)
-    }
-
-    /// See [`Engine::gradient`].
-    pub(crate) fn gradient_by_mask(
-        &self,
-        shown: &GridPlanes,
-        cotangent: &Cotangent,
-    ) -> Result<MaskGradient, NetError> {
-        let mut predictions = vec![0.0; shown.positions.len()];
-        let mut by_positions = vec![0.0; shown.positions.len()];
-        let mut by_mask = vec![0.0; shown.known.len()];
-        let mut scratch = self.scratch();
-        let out = Gradient {
-            prediction: &mut predictions,
-            by_positions: &mut by_positions,
-            by_known: &mut by_mask,
-        };
-        self.engine
-            .gradient(&mut scratch, shown.as_input(), cotangent, out)?;
-        self.lock().push(scratch);
-        Ok(MaskGradient {
-            predictions,
-            by_mask,
-        })
-    }
-
-    /// Buffers that no other call is using.
+    /// Buffers that no other call uses.
     fn scratch(&self) -> Scratch {
         self.lock().pop().unwrap_or_default()
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Scratch>> {
-        // Nothing that is done under the lock can panic half-way.
+        // A panic under the lock cannot leave the pool half changed: it only pushes and pops.
         self.idle.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -119,8 +81,13 @@ impl Runtime for EngineRuntime {
         self.engine.prepare();
     }
 
-    fn predict(&self, shown: &GridPlanes) -> Result<Vec<f32>, NetError> {
-        self.predict_planes(shown)
+    fn predict(&self, input: &GridPlanes) -> Result<Vec<f32>, NetError> {
+        let mut out = vec![0.0; 3 * input.known.len()];
+        let mut scratch = self.scratch();
+        self.engine
+            .predict(&mut scratch, input.as_input(), &mut out)?;
+        self.lock().push(scratch);
+        Ok(out)
     }
 
     fn anchor_losses(
@@ -128,7 +95,8 @@ impl Runtime for EngineRuntime {
         problem: &AnchorProblem,
         uvs: &[[f32; 2]],
     ) -> Result<Vec<f32>, NetError> {
-        anchor::losses(self, problem, uvs)
+        let batch = AnchorBatch::new(problem, uvs);
+        batch.losses(&self.predict(&batch.input())?)
     }
 
     fn anchor_gradients(
@@ -136,6 +104,23 @@ impl Runtime for EngineRuntime {
         problem: &AnchorProblem,
         uvs: &[[f32; 2]],
     ) -> Result<Vec<AnchorLoss>, NetError> {
-        anchor::gradients(self, problem, uvs)
+        let batch = AnchorBatch::new(problem, uvs);
+        let input = batch.input();
+        let mut predictions = vec![0.0; input.positions.len()];
+        let mut by_positions = vec![0.0; input.positions.len()];
+        let mut by_mask = vec![0.0; input.known.len()];
+        let cotangent = |place: usize, prediction: &[f32], by: &mut [f32]| {
+            batch.cotangent(place, prediction, by);
+        };
+        let out = InputGradient {
+            prediction: &mut predictions,
+            by_positions: &mut by_positions,
+            by_known: &mut by_mask,
+        };
+        let mut scratch = self.scratch();
+        self.engine
+            .gradient(&mut scratch, input.as_input(), &cotangent, out)?;
+        self.lock().push(scratch);
+        batch.gradients(&predictions, &by_mask)
     }
 }

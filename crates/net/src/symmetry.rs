@@ -1,20 +1,21 @@
-//! The grid's symmetries: the network, asked about a grid turned and mirrored, answers alike but not the same; the mean is better.
+//! The grid's symmetries. The network's predictions for a grid and for its mirror images differ a little; their mean is better.
 
 use darn_geometry::grid::{CELLS, SIDE, cell_index};
 
-/// The symmetries that answers are averaged over, as [`origins`] numbers them. All eight gain nothing over the flips once the cloth is
-/// patched (`weights/README.md` has the table).
+/// The symmetries that predictions are averaged over. All eight are no better than the flips once the cloth is patched (the table is in
+/// `weights/README.md`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Averaging {
     /// The grid as it is: one pass.
     Once,
-    /// The grid as it is, mirrored in u, in v and in both: for cloth that stays.
+    /// The grid as it is, mirrored in u, in v and in both: for a mend's result.
     Flips,
-    /// As it is and turned by half: for the small differences of editing, which should be quick.
+    /// The grid as it is and mirrored in both u and v: for the updates of an edit session, which must be quick.
     HalfTurn,
 }
 
 impl Averaging {
+    /// The symmetries as [`origins`] numbers them.
     pub(crate) fn symmetries(self) -> &'static [usize] {
         match self {
             Averaging::Once => &[0],
@@ -24,7 +25,8 @@ impl Averaging {
     }
 }
 
-/// Per cell, the cell it comes from: bit 0 flips u, bit 1 flips v, bit 2 swaps them.
+/// For each cell of the transformed grid, the cell of the grid that it comes from. Bit 0 of `symmetry` flips u, bit 1 flips v, bit 2
+/// swaps them.
 pub fn origins(symmetry: usize) -> Vec<usize> {
     let origin = |k: usize| {
         let (mut i, mut j) = (k % SIDE, k / SIDE);

@@ -1,5 +1,5 @@
-//! Weights files: safetensors with readable tensor names (`down.0.conv0.weight`), f16 on disk, and a card in the metadata.
-//! Loading checks names, shapes and finite values, and an error names the tensor.
+//! Weights files: safetensors with readable tensor names (`down.0.conv0.weight`), f16 on disk, and a model card in the metadata.
+//! Errors give the name of the tensor.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -8,26 +8,29 @@ use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::{NetError, UnetConfig};
+use crate::config::UnetConfig;
+use crate::error::NetError;
 
-/// The one metadata key; a single key keeps the header's bytes the same from run to run.
+pub use crate::tensors::NamedTensors;
+
+/// The only metadata key. With several, their order in the file, and so its bytes, would change from run to run.
 const CARD_KEY: &str = "darn";
 
 /// A model card: what a weights file is and where it comes from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WeightsCard {
-    /// Name a request chooses it by, e.g. `standard`.
+    /// The name by which requests choose it, e.g. `standard`.
     pub name: String,
-    /// SHA-256 of the whole file, hex; not stored in it.
+    /// SHA-256 of the whole file in hex; not stored in the file.
     #[serde(skip)]
     pub sha256: String,
-    /// What the network is built from.
+    /// The architecture of the network.
     pub architecture: UnetConfig,
     /// How it was trained.
     pub training: TrainingCard,
     /// Held-out scores by name, e.g. `rmse_cells`.
     pub scores: BTreeMap<String, f64>,
-    /// The darn that wrote it.
+    /// The version of darn that wrote the file.
     pub darn_version: String,
 }
 
@@ -36,27 +39,45 @@ pub struct WeightsCard {
 pub struct TrainingCard {
     /// Optimiser steps.
     pub steps: u64,
-    /// Samples a step.
+    /// Samples per step.
     pub batch: usize,
     /// Seed of weights and samples.
     pub seed: u64,
-    /// Samples seen.
+    /// Samples in total.
     pub samples: u64,
     /// Minutes of training.
     pub minutes: f64,
-    /// Seed of the sheets, when known.
+    /// Seed of the simulated sheets, if known.
     pub data_seed: Option<u64>,
-    /// What the loss was made of, in words and weights.
+    /// The terms of the loss and their weights, in words.
     pub loss: String,
 }
 
-/// The tensors of a network by name, each with its shape; f32.
-pub type NamedTensors = BTreeMap<String, (Vec<usize>, Vec<f32>)>;
-
-/// Writes a weights file: matrices and kernels as f16; vectors (biases and statistics: few, and of any magnitude) as f32.
+/// Writes a weights file: matrices and kernels as f16, vectors (biases and statistics, which are few and of any magnitude) as f32.
 ///
 /// # Errors
 /// A value that is not finite in its type on disk.
+///
+/// # Examples
+/// ```
+/// use darn_net::weights::{self, NamedTensors};
+/// use darn_net::{TrainingCard, UnetConfig, WeightsCard};
+///
+/// let tensors = NamedTensors::from([("last.bias".to_owned(), (vec![3], vec![0.5, 0.0, -1.0]))]);
+/// let card = WeightsCard {
+///     name: "mine".to_owned(),
+///     sha256: String::new(),
+///     architecture: UnetConfig::default(),
+///     training: TrainingCard::default(),
+///     scores: Default::default(),
+///     darn_version: "0.1.0".to_owned(),
+/// };
+/// let bytes = weights::write(&tensors, &card)?;
+/// let (read_card, read_tensors) = weights::read(&bytes)?;
+/// assert_eq!(read_card.name, "mine");
+/// assert_eq!(read_tensors, tensors);
+/// # Ok::<(), darn_net::NetError>(())
+/// ```
 pub fn write(tensors: &NamedTensors, card: &WeightsCard) -> Result<Vec<u8>, NetError> {
     let mut encoded = Vec::with_capacity(tensors.len());
     for (name, (shape, values)) in tensors {
@@ -124,10 +145,10 @@ pub fn read(bytes: &[u8]) -> Result<(WeightsCard, NamedTensors), NetError> {
     Ok((card, tensors))
 }
 
-/// Whether a card's width is one that can be built, and that of the tensors beside it.
+/// Checks that a card's width is supported and is that of the tensors.
 ///
 /// # Errors
-/// A width outside 1..=256, or another than the last layer's.
+/// A width outside 1..=256, or another width than that of the last layer.
 pub fn check(card: &WeightsCard, tensors: &NamedTensors) -> Result<(), NetError> {
     if !(1..=256).contains(&card.architecture.width) {
         return Err(NetError::Card(format!(
@@ -135,7 +156,7 @@ pub fn check(card: &WeightsCard, tensors: &NamedTensors) -> Result<(), NetError>
             card.architecture.width
         )));
     }
-    // Compare with the cheapest thing first: a file that claims a large width but is small must not make us allocate it.
+    // A small file with a large width in its card must be refused before a network of that width is allocated.
     let last = tensors
         .get("last.weight")
         .ok_or_else(|| NetError::MissingTensor {

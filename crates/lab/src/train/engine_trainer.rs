@@ -13,7 +13,9 @@ use super::options::TrainOptions;
 use super::snapshot::TrainSnapshot;
 use super::trainer::{StepOutcome, Trainer};
 use darn_geometry::grid::CELLS;
-use darn_net::engine::{Engine, EngineError, EngineOptions, Input, Lessons, Scratch};
+use darn_net::engine::{
+    Engine, EngineError, EngineInput, EngineOptions, Scratch, WeightGradientBuffers,
+};
 use darn_net::weights::NamedTensors;
 use darn_net::{UnetConfig, cells};
 
@@ -26,7 +28,7 @@ pub(super) struct EngineTrainer {
     /// First and second moments by trained tensor, in the order of the names.
     moments: Vec<[Vec<f32>; 2]>,
     step: u64,
-    lessons: Lessons,
+    buffers: WeightGradientBuffers,
 }
 
 /// A tensor of a step.
@@ -47,8 +49,8 @@ impl EngineTrainer {
         Engine::new(tensors, &self.config, options)
     }
 
-    fn input<'a>(&self, batch: &'a TrainingBatch) -> Input<'a> {
-        Input {
+    fn input<'a>(&self, batch: &'a TrainingBatch) -> EngineInput<'a> {
+        EngineInput {
             positions: &batch.positions,
             known: &batch.known,
             base: Some(&batch.base),
@@ -133,7 +135,7 @@ impl Trainer for EngineTrainer {
             averaged: snapshot.averaged,
             moments: snapshot.moments,
             step: snapshot.step,
-            lessons: Lessons::default(),
+            buffers: WeightGradientBuffers::default(),
         })
     }
 
@@ -146,14 +148,15 @@ impl Trainer for EngineTrainer {
         let engine = self.engine(&self.network)?;
         let input = self.input(&batch);
         let count = batch.count;
-        let lesson = |grids: Range<usize>, predictions: &[f32], by: &mut [f32]| {
+        let batch_loss = |grids: Range<usize>, predictions: &[f32], by: &mut [f32]| {
             let share = grids.len() as f32 / count as f32;
             let terms = loss_and_gradient(predictions, &batch.part(grids), &options.loss, by);
             by.iter_mut().for_each(|x| *x *= share);
             terms.scaled(share)
         };
-        let lessons = &mut self.lessons;
-        let (gradient, terms) = engine.learn(lessons, &self.network, input, &lesson)?;
+        let buffers = &mut self.buffers;
+        let (gradient, terms) =
+            engine.weight_gradients(buffers, &self.network, input, &batch_loss)?;
         let norm = self.descend(&gradient, rate);
         self.average();
         Ok(StepOutcome {

@@ -10,19 +10,19 @@
 use super::batch::{PreparedSample, TrainingBatch};
 use darn_geometry::grid::CELLS;
 use darn_net::InputKind;
-use darn_net::engine::{Input, seen};
+use darn_net::engine::{EngineInput, input_positions};
 
 /// Appends the records of `samples` to `records`.
 pub fn write(samples: &[PreparedSample], records: &mut Vec<u8>) {
     for sample in samples {
         let batch = TrainingBatch::of(std::slice::from_ref(sample));
-        let grid = Input {
+        let grid = EngineInput {
             positions: &batch.positions,
             known: &batch.known,
             base: Some(&batch.base),
             up: None,
         };
-        let seen = seen(InputKind::Plate, grid);
+        let seen = input_positions(InputKind::Plate, grid);
         let numbers = seen.iter().chain(&batch.truth).chain(&batch.up);
         records.extend(numbers.flat_map(|x| x.to_le_bytes()));
         let flags = |k: usize| {

@@ -4,7 +4,7 @@
 use super::tests::{CONFIG, bent, card, disk, filled, largest_distance, silent, tensors};
 use super::*;
 use darn_geometry::grid::{CELLS, NormalGrid, SIDE};
-use darn_net::reference::Reference;
+use darn_net::reference::ReferenceNetwork;
 use darn_net::weights::{NamedTensors, read, write};
 use darn_net::{FrameKind, SIGMA, plate};
 
@@ -32,7 +32,7 @@ fn plain_loss(tensors: &NamedTensors, grid: &NormalGrid, target: [f32; 3], at: [
     let soft: Vec<f64> = (0..CELLS)
         .map(|k| known(k) + bell[k] * (1.0 - known(k)))
         .collect();
-    let answer = Reference { tensors, config }.predict(&positions, &soft);
+    let answer = ReferenceNetwork { tensors, config }.predict(&positions, &soft);
     let total: f64 = bell.iter().sum();
     let off = (0..3).map(|axis| {
         let plane = &answer[axis * CELLS..][..CELLS];

@@ -1,17 +1,17 @@
-//! The membrane of [`crate::membrane`] on plain slices, and its adjoint: a push–pull pyramid with Jacobi sweeps at every level.
+//! The membrane (see [`crate::fill`]) and its adjoint: a push–pull pyramid with Jacobi sweeps at every level.
 
-use super::simd::{Kernel, Simd, Target};
+use super::simd::{Kernel, Simd, TargetIsa};
 use crate::fill::{NOTHING, SATURATION, SWEEPS};
 use darn_geometry::grid::{CELLS, SIDE};
 
 /// Levels of the pyramid, of sides 64 to 1.
 const LEVELS: usize = SIDE.ilog2() as usize + 1;
 
-/// Room for one image's pyramid.
+/// Reusable buffers for the pyramid of one image.
 #[derive(Debug)]
 pub struct Pyramid {
     levels: Vec<Level>,
-    /// Every level's planes after its start and each sweep, while an adjoint is wanted.
+    /// By level: the planes before each sweep; empty until the first adjoint.
     history: Vec<Vec<f32>>,
     mean: Vec<f32>,
 }
@@ -21,16 +21,18 @@ pub struct Pyramid {
 struct Level {
     side: usize,
     sweeps: usize,
-    /// What the cells know: three planes.
+    /// Known positions times `weight`: three planes.
     values: Vec<f32>,
+    /// How far a cell is known.
     weight: Vec<f32>,
-    /// How far a cell follows what it knows.
+    /// How far a cell follows its own value; the rest comes from its neighbours.
     share: Vec<f32>,
+    /// Value ÷ weight × share: three planes.
     given: Vec<f32>,
-    /// The answer, or the gradient with respect to it: three planes, and room for the next sweep.
+    /// The fill, or the gradient with respect to it: three planes.
     filled: Vec<f32>,
+    /// The fill after the sweep that is being computed.
     next: Vec<f32>,
-    /// Gradients with respect to values and weight.
     by_values: Vec<f32>,
     by_weight: Vec<f32>,
     by_share: Vec<f32>,
@@ -63,28 +65,34 @@ impl Default for Pyramid {
     }
 }
 
-/// Fills unknown cells of one image: three planes and a mask to three planes.
-pub fn membrane(
-    target: Target,
-    pyramid: &mut Pyramid,
-    (positions, known): (&[f32], &[f32]),
-    filled: &mut [f32],
-) {
-    target.run(Fill {
-        pyramid,
-        positions,
-        known,
-    });
+/// A grid whose unknown cells are to be filled.
+#[derive(Clone, Copy)]
+pub struct MembraneGrid<'a> {
+    /// `[3, 64, 64]`.
+    pub positions: &'a [f32],
+    /// `[1, 64, 64]` in 0..=1.
+    pub known: &'a [f32],
+}
+
+/// Receives gradients with respect to a grid; see [`MembraneGrid`] for their shapes.
+pub struct MembraneGradient<'a> {
+    pub by_positions: &'a mut [f32],
+    pub by_known: &'a mut [f32],
+}
+
+/// Fills the unknown cells of one grid: `filled` receives `[3, 64, 64]`.
+pub fn membrane(target: TargetIsa, pyramid: &mut Pyramid, grid: MembraneGrid, filled: &mut [f32]) {
+    target.run(Fill { pyramid, grid });
     filled.copy_from_slice(&pyramid.levels[0].filled);
 }
 
-/// Adds the gradient with respect to positions and mask, of the membrane's planes times `cotangent`.
-pub fn adjoint(
-    target: Target,
+/// Adds the gradients of Σ cotangent · filled.
+pub fn membrane_adjoint(
+    target: TargetIsa,
     pyramid: &mut Pyramid,
-    (positions, known): (&[f32], &[f32]),
+    grid: MembraneGrid,
     cotangent: &[f32],
-    (by_positions, by_known): (&mut [f32], &mut [f32]),
+    by: MembraneGradient,
 ) {
     if pyramid.history.is_empty() {
         let size = |level: &Level| level.filled.len() * level.sweeps;
@@ -96,25 +104,22 @@ pub fn adjoint(
     }
     target.run(Adjoint {
         pyramid,
-        positions,
-        known,
+        grid,
         cotangent,
-        by_positions,
-        by_known,
+        by,
     });
 }
 
-/// The forward pass, compiled for the target.
+/// [`membrane`], compiled for the target.
 struct Fill<'a> {
     pyramid: &'a mut Pyramid,
-    positions: &'a [f32],
-    known: &'a [f32],
+    grid: MembraneGrid<'a>,
 }
 
 impl Kernel for Fill<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        self.pyramid.enter(self.positions, self.known);
+        self.pyramid.set_grid(self.grid);
         for level in (0..LEVELS).rev() {
             self.pyramid.start(level);
             for _ in 0..self.pyramid.levels[level].sweeps {
@@ -124,21 +129,19 @@ impl Kernel for Fill<'_> {
     }
 }
 
-/// The adjoint, compiled for the target; runs the forward pass again to have its steps.
+/// [`membrane_adjoint`], compiled for the target. It runs the forward pass again to record its sweeps.
 struct Adjoint<'a> {
     pyramid: &'a mut Pyramid,
-    positions: &'a [f32],
-    known: &'a [f32],
+    grid: MembraneGrid<'a>,
     cotangent: &'a [f32],
-    by_positions: &'a mut [f32],
-    by_known: &'a mut [f32],
+    by: MembraneGradient<'a>,
 }
 
 impl Kernel for Adjoint<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
         let pyramid = self.pyramid;
-        pyramid.enter(self.positions, self.known);
+        pyramid.set_grid(self.grid);
         for level in (0..LEVELS).rev() {
             pyramid.start(level);
             let fine = &mut pyramid.levels[level];
@@ -161,23 +164,24 @@ impl Kernel for Adjoint<'_> {
         for plane in 0..3 {
             let plane = plane * CELLS..(plane + 1) * CELLS;
             let by_values = &finest.by_values[plane.clone()];
-            let positions = &self.positions[plane.clone()];
-            let by_positions = &mut self.by_positions[plane];
+            let positions = &self.grid.positions[plane.clone()];
+            let by_positions = &mut self.by.by_positions[plane];
             for cell in 0..CELLS {
-                by_positions[cell] += by_values[cell] * self.known[cell];
-                self.by_known[cell] += by_values[cell] * positions[cell];
+                by_positions[cell] += by_values[cell] * self.grid.known[cell];
+                self.by.by_known[cell] += by_values[cell] * positions[cell];
             }
         }
-        for (by, weight) in self.by_known.iter_mut().zip(&finest.by_weight) {
+        for (by, weight) in self.by.by_known.iter_mut().zip(&finest.by_weight) {
             *by += weight;
         }
     }
 }
 
 impl Pyramid {
-    /// Values, weights, shares and given parts of all levels.
+    /// Computes values, weights, shares and given parts of all levels.
     #[inline(always)]
-    fn enter(&mut self, positions: &[f32], known: &[f32]) {
+    fn set_grid(&mut self, grid: MembraneGrid) {
+        let MembraneGrid { positions, known } = grid;
         let finest = &mut self.levels[0];
         finest.weight.copy_from_slice(known);
         for (values, positions) in finest.values.chunks_mut(CELLS).zip(positions.chunks(CELLS)) {
@@ -209,7 +213,7 @@ impl Pyramid {
         }
     }
 
-    /// A level's first guess: what it knows, and elsewhere the coarser level's answer.
+    /// A level's start: its given part, and the coarser level's fill for the rest.
     #[inline(always)]
     fn start(&mut self, level: usize) {
         let (finer, coarser) = self.levels.split_at_mut(level + 1);
@@ -231,7 +235,7 @@ impl Pyramid {
         }
     }
 
-    /// Gradients with respect to a level's given part (left in `by_values`) and share, and to the coarser level's answer.
+    /// Gradients with respect to a level's given part (left in `by_values`), its share, and the coarser level's fill.
     #[inline(always)]
     fn sweeps_adjoint(&mut self, level: usize, cotangent: &[f32]) {
         let (finer, coarser) = self.levels.split_at_mut(level + 1);
@@ -253,7 +257,7 @@ impl Pyramid {
                     fine.by_share[i] -= gradient[i] * mean[i];
                     gradient[i] *= 1.0 - fine.share[i];
                 }
-                // The mean of neighbours is its own adjoint.
+                // The mean of neighbours is self-adjoint.
                 neighbours(fine.side, gradient, mean);
                 gradient.copy_from_slice(mean);
                 let by_given = &mut fine.by_values[plane * cells..][..cells];
@@ -294,7 +298,7 @@ impl Level {
         std::mem::swap(&mut self.filled, &mut self.next);
     }
 
-    /// From the gradient with respect to the given part (in `by_values`) and the share to those with respect to values and weight.
+    /// Turns the gradients with respect to the given part (in `by_values`) and the share into those with respect to values and weight.
     #[inline(always)]
     fn shares_adjoint(&mut self, level: usize) {
         let cells = self.side * self.side;
@@ -310,7 +314,7 @@ impl Level {
             }
             by_weight += match level {
                 0 => by_share,
-                // At saturation itself the slope is the left one, as burn's.
+                // Exactly at saturation the slope is the left one, as in burn.
                 _ if self.weight[i] * SATURATION <= 1.0 => by_share * SATURATION,
                 _ => 0.0,
             };
@@ -319,7 +323,7 @@ impl Level {
     }
 }
 
-/// Mean of the four neighbours of every cell, the border's missing ones replaced by the cell itself.
+/// Mean of the four neighbours of every cell; outside the border the cell itself counts instead.
 #[inline(always)]
 fn neighbours(side: usize, x: &[f32], mean: &mut [f32]) {
     for (j, to) in mean.chunks_mut(side).enumerate() {
@@ -338,7 +342,7 @@ fn neighbours(side: usize, x: &[f32], mean: &mut [f32]) {
     }
 }
 
-/// Means of 2×2 cells, plane by plane, to planes of `side²`.
+/// Means of 2×2 cells, from planes of (2 · `side`)² to planes of `side²`.
 #[inline(always)]
 fn halve(side: usize, fine: &[f32], coarse: &mut [f32]) {
     for (two, to) in fine.chunks(4 * side).zip(coarse.chunks_mut(side)) {
@@ -362,7 +366,7 @@ fn halve_adjoint(side: usize, coarse: &[f32], fine: &mut [f32]) {
     }
 }
 
-/// The other cell that a fine cell is interpolated from, along one axis; the nearer one is `fine / 2` and weighs three quarters.
+/// The farther of the two coarse cells that a fine cell is interpolated from along one axis. The nearer one is `fine / 2`, with weight ¾.
 #[inline(always)]
 fn farther(side: usize, fine: usize) -> usize {
     match fine % 2 {

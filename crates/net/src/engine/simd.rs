@@ -1,12 +1,13 @@
-//! Sixteen floats at a time: one trait, its instances for AVX-512, AVX2 with FMA, NEON and plain Rust, and the choice between them.
-//! The only file of darn with `unsafe`. Every instance computes the same per lane, in the same order; the plain one rounds a product
-//! before it is added, the others do not.
+//! Arithmetic on sixteen floats: one trait, its implementations for AVX-512, AVX2 with FMA, NEON and plain Rust, and the choice of one
+//! at run time. This is the only file of darn with `unsafe`.
+//!
+//! Every implementation computes the same per lane, in the same order. Only the plain one rounds a product before it is added.
 
 #![allow(unsafe_code)]
 
 use std::str::FromStr;
 
-/// Floats in a block, and channels in a panel.
+/// Floats in a [`Block`], and channels in a channel block.
 pub const LANES: usize = 16;
 
 /// Sixteen channels of one cell; aligned to a cache line.
@@ -15,9 +16,10 @@ pub const LANES: usize = 16;
 pub struct Block(pub [f32; LANES]);
 
 impl Block {
+    /// All lanes zero.
     pub const ZERO: Block = Block([0.0; LANES]);
 
-    /// Sum of the lanes, in an order that is the same on every CPU.
+    /// Sum of the lanes, in the same order on every CPU.
     #[inline(always)]
     pub fn sum(&self) -> f32 {
         let mut eight = [0.0; 8];
@@ -34,39 +36,48 @@ impl Block {
 
 /// Arithmetic on sixteen floats.
 ///
-/// A value of an implementing type is the proof that the CPU has the instructions: only [`Target::run`] makes one.
+/// A value of an implementing type proves that the CPU has the instructions: only [`TargetIsa::run`] makes one, after the CPU was asked.
 pub trait Simd: Copy {
     /// Sixteen floats in registers.
     type V: Copy;
-    /// Rows of accumulators that fit the registers beside their operands.
+    /// Accumulators that fit the registers beside their operands.
     const ROWS: usize;
+    /// `x` in every lane.
     fn splat(self, x: f32) -> Self::V;
+    /// Reads a block.
     fn load(self, x: &Block) -> Self::V;
+    /// Writes a block.
     fn store(self, x: Self::V, to: &mut Block);
+    /// a + b.
     fn add(self, a: Self::V, b: Self::V) -> Self::V;
+    /// a − b.
     fn sub(self, a: Self::V, b: Self::V) -> Self::V;
+    /// a · b.
     fn mul(self, a: Self::V, b: Self::V) -> Self::V;
     /// a · b + c.
     fn mul_add(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V;
     /// The larger one, lane by lane; `b` where they are equal.
     fn max(self, a: Self::V, b: Self::V) -> Self::V;
     /// `x` where `by` is positive, zero elsewhere.
-    fn gate(self, x: Self::V, by: Self::V) -> Self::V;
-    /// Asks for the block so many further on, which need not exist.
+    fn where_positive(self, x: Self::V, by: Self::V) -> Self::V;
+    /// Prefetches the block `ahead` blocks after `near`, which need not exist.
     #[inline(always)]
     fn prefetch(self, _near: &Block, _ahead: usize) {}
 }
 
-/// Work that is compiled once for every instruction set. Implementations must be `#[inline(always)]`, and all they call with a
-/// [`Simd`], so that the intrinsics end up in a function that has the instructions.
+/// A computation that is compiled once for every instruction set.
+///
+/// `run`, and every function that it gives its [`Simd`] to, must be `#[inline(always)]`: the intrinsics must be inlined into a function
+/// that is compiled for the instruction set.
 pub trait Kernel {
+    /// Computes with an instruction set.
     fn run<S: Simd>(self, s: S);
 }
 
 /// An instruction set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Isa {
-    /// Plain Rust, vectorised by the compiler for the least CPU of the platform; runs everywhere.
+    /// Plain Rust, compiled for the oldest CPU of the platform; runs everywhere.
     Portable,
     /// 128 bits on Arm.
     Neon,
@@ -77,10 +88,10 @@ pub enum Isa {
 }
 
 impl Isa {
-    /// All of them, best last.
+    /// All instruction sets, the fastest last.
     pub const ALL: [Isa; 4] = [Isa::Portable, Isa::Neon, Isa::Avx2, Isa::Avx512];
 
-    /// The name that [`FromStr`] reads.
+    /// The name, as [`FromStr`] reads it.
     pub fn name(self) -> &'static str {
         match self {
             Isa::Portable => "portable",
@@ -100,13 +111,13 @@ impl Isa {
             Isa::Avx512 => is_x86_feature_detected!("avx512f") && Isa::Avx2.is_available(),
             #[cfg(target_arch = "aarch64")]
             Isa::Neon => std::arch::is_aarch64_feature_detected!("neon"),
-            #[allow(unreachable_patterns)] // which ones are left depends on the platform
+            #[allow(unreachable_patterns)] // the remaining variants depend on the platform
             _ => false,
         }
     }
 }
 
-/// A name that is no instruction set's.
+/// A name that no instruction set has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("instruction set `{0}` is unknown; there are: portable, neon, avx2, avx512")]
 pub struct UnknownIsa(String);
@@ -122,25 +133,26 @@ impl FromStr for Isa {
     }
 }
 
-/// An instruction set that this CPU was seen to have.
+/// An instruction set that this CPU has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Target(Isa);
+pub struct TargetIsa(Isa);
 
-impl Target {
-    /// `None` where the CPU lacks it.
-    pub fn new(isa: Isa) -> Option<Target> {
-        isa.is_available().then_some(Target(isa))
+impl TargetIsa {
+    /// `None` if the CPU lacks the instruction set.
+    pub fn new(isa: Isa) -> Option<TargetIsa> {
+        isa.is_available().then_some(TargetIsa(isa))
     }
 
-    /// The best of this CPU.
-    pub fn best() -> Target {
+    /// The fastest of this CPU.
+    pub fn best() -> TargetIsa {
         Isa::ALL
             .into_iter()
             .rev()
-            .find_map(Target::new)
-            .unwrap_or(Target(Isa::Portable))
+            .find_map(TargetIsa::new)
+            .unwrap_or(TargetIsa(Isa::Portable))
     }
 
+    /// The instruction set.
     pub fn isa(self) -> Isa {
         self.0
     }
@@ -148,13 +160,13 @@ impl Target {
     /// Runs a kernel with this instruction set.
     pub fn run<K: Kernel>(self, kernel: K) {
         match self.0 {
-            // SAFETY: `Target::new` is the only way to a target other than the portable one, and it has asked the CPU.
+            // SAFETY: only `TargetIsa::new` makes a value with AVX-512, after `is_available` found AVX-512F, AVX2 and FMA on this CPU.
             #[cfg(target_arch = "x86_64")]
             Isa::Avx512 => unsafe { run_avx512(kernel) },
-            // SAFETY: as above.
+            // SAFETY: only `TargetIsa::new` makes a value with AVX2, after `is_available` found AVX2 and FMA on this CPU.
             #[cfg(target_arch = "x86_64")]
             Isa::Avx2 => unsafe { run_avx2(kernel) },
-            // SAFETY: as above.
+            // SAFETY: only `TargetIsa::new` makes a value with NEON, after `is_available` found NEON on this CPU.
             #[cfg(target_arch = "aarch64")]
             Isa::Neon => unsafe { run_neon(kernel) },
             _ => kernel.run(Portable),
@@ -231,7 +243,7 @@ impl Simd for Portable {
         each(a, b, |a, b| if a > b { a } else { b })
     }
     #[inline(always)]
-    fn gate(self, x: Block, by: Block) -> Block {
+    fn where_positive(self, x: Block, by: Block) -> Block {
         each(x, by, |x, by| if by > 0.0 { x } else { 0.0 })
     }
 }
@@ -241,18 +253,18 @@ mod x86 {
     use super::{Block, Simd};
     use std::arch::x86_64::*;
 
-    /// Proof of AVX-512F; made by `run_avx512` alone.
+    /// Proof that the CPU has AVX-512F; only `run_avx512` makes one.
     #[derive(Clone, Copy)]
     pub struct Avx512(pub(super) ());
 
-    /// Proof of AVX2 and FMA; made by `run_avx2` alone.
+    /// Proof that the CPU has AVX2 and FMA; only `run_avx2` makes one.
     #[derive(Clone, Copy)]
     pub struct Avx2(pub(super) ());
 
     #[inline(always)]
     fn prefetch(near: &Block, ahead: usize) {
         let far = std::ptr::from_ref(near).wrapping_add(ahead);
-        // SAFETY: a hint that never faults, whatever the address; every x86-64 has it.
+        // SAFETY: prefetching is a hint that never faults, whatever the address; every x86-64 CPU has it.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(far.cast()) }
     }
 
@@ -262,47 +274,47 @@ mod x86 {
 
         #[inline(always)]
         fn splat(self, x: f32) -> __m512 {
-            // SAFETY: `self` proves AVX-512F; so in all functions of this instance.
+            // SAFETY: `self` proves AVX-512F.
             unsafe { _mm512_set1_ps(x) }
         }
         #[inline(always)]
         fn load(self, x: &Block) -> __m512 {
-            // SAFETY: AVX-512F as above; a `Block` is 64 bytes, aligned to 64.
+            // SAFETY: `self` proves AVX-512F. A `Block` is 64 bytes, aligned to 64.
             unsafe { _mm512_load_ps(x.0.as_ptr()) }
         }
         #[inline(always)]
         fn store(self, x: __m512, to: &mut Block) {
-            // SAFETY: AVX-512F as above; a `Block` is 64 bytes, aligned to 64, and borrowed mutably.
+            // SAFETY: `self` proves AVX-512F. A `Block` is 64 bytes, aligned to 64, and borrowed mutably.
             unsafe { _mm512_store_ps(to.0.as_mut_ptr(), x) }
         }
         #[inline(always)]
         fn add(self, a: __m512, b: __m512) -> __m512 {
-            // SAFETY: AVX-512F as above.
+            // SAFETY: `self` proves AVX-512F.
             unsafe { _mm512_add_ps(a, b) }
         }
         #[inline(always)]
         fn sub(self, a: __m512, b: __m512) -> __m512 {
-            // SAFETY: AVX-512F as above.
+            // SAFETY: `self` proves AVX-512F.
             unsafe { _mm512_sub_ps(a, b) }
         }
         #[inline(always)]
         fn mul(self, a: __m512, b: __m512) -> __m512 {
-            // SAFETY: AVX-512F as above.
+            // SAFETY: `self` proves AVX-512F.
             unsafe { _mm512_mul_ps(a, b) }
         }
         #[inline(always)]
         fn mul_add(self, a: __m512, b: __m512, c: __m512) -> __m512 {
-            // SAFETY: AVX-512F as above.
+            // SAFETY: `self` proves AVX-512F.
             unsafe { _mm512_fmadd_ps(a, b, c) }
         }
         #[inline(always)]
         fn max(self, a: __m512, b: __m512) -> __m512 {
-            // SAFETY: AVX-512F as above.
+            // SAFETY: `self` proves AVX-512F.
             unsafe { _mm512_max_ps(a, b) }
         }
         #[inline(always)]
-        fn gate(self, x: __m512, by: __m512) -> __m512 {
-            // SAFETY: AVX-512F as above.
+        fn where_positive(self, x: __m512, by: __m512) -> __m512 {
+            // SAFETY: `self` proves AVX-512F.
             unsafe {
                 let open = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(by, _mm512_setzero_ps());
                 _mm512_maskz_mov_ps(open, x)
@@ -320,19 +332,19 @@ mod x86 {
 
         #[inline(always)]
         fn splat(self, x: f32) -> [__m256; 2] {
-            // SAFETY: `self` proves AVX2 and FMA; so in all functions of this instance.
+            // SAFETY: `self` proves AVX2 and FMA.
             unsafe { [_mm256_set1_ps(x); 2] }
         }
         #[inline(always)]
         fn load(self, x: &Block) -> [__m256; 2] {
             let (low, high) = x.0.split_at(8);
-            // SAFETY: AVX2 as above; each half of a `Block` is 32 bytes, aligned to 32.
+            // SAFETY: `self` proves AVX2. Each half of a `Block` is 32 bytes, aligned to 32.
             unsafe { [_mm256_load_ps(low.as_ptr()), _mm256_load_ps(high.as_ptr())] }
         }
         #[inline(always)]
         fn store(self, x: [__m256; 2], to: &mut Block) {
             let (low, high) = to.0.split_at_mut(8);
-            // SAFETY: AVX2 as above; each half of a `Block` is 32 bytes, aligned to 32, and borrowed mutably.
+            // SAFETY: `self` proves AVX2. Each half of a `Block` is 32 bytes, aligned to 32, and borrowed mutably.
             unsafe {
                 _mm256_store_ps(low.as_mut_ptr(), x[0]);
                 _mm256_store_ps(high.as_mut_ptr(), x[1]);
@@ -340,22 +352,22 @@ mod x86 {
         }
         #[inline(always)]
         fn add(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
-            // SAFETY: AVX2 as above.
+            // SAFETY: `self` proves AVX2.
             unsafe { [_mm256_add_ps(a[0], b[0]), _mm256_add_ps(a[1], b[1])] }
         }
         #[inline(always)]
         fn sub(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
-            // SAFETY: AVX2 as above.
+            // SAFETY: `self` proves AVX2.
             unsafe { [_mm256_sub_ps(a[0], b[0]), _mm256_sub_ps(a[1], b[1])] }
         }
         #[inline(always)]
         fn mul(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
-            // SAFETY: AVX2 as above.
+            // SAFETY: `self` proves AVX2.
             unsafe { [_mm256_mul_ps(a[0], b[0]), _mm256_mul_ps(a[1], b[1])] }
         }
         #[inline(always)]
         fn mul_add(self, a: [__m256; 2], b: [__m256; 2], c: [__m256; 2]) -> [__m256; 2] {
-            // SAFETY: AVX2 and FMA as above.
+            // SAFETY: `self` proves AVX2 and FMA.
             unsafe {
                 [
                     _mm256_fmadd_ps(a[0], b[0], c[0]),
@@ -365,12 +377,12 @@ mod x86 {
         }
         #[inline(always)]
         fn max(self, a: [__m256; 2], b: [__m256; 2]) -> [__m256; 2] {
-            // SAFETY: AVX2 as above.
+            // SAFETY: `self` proves AVX2.
             unsafe { [_mm256_max_ps(a[0], b[0]), _mm256_max_ps(a[1], b[1])] }
         }
         #[inline(always)]
-        fn gate(self, x: [__m256; 2], by: [__m256; 2]) -> [__m256; 2] {
-            // SAFETY: AVX2 as above.
+        fn where_positive(self, x: [__m256; 2], by: [__m256; 2]) -> [__m256; 2] {
+            // SAFETY: `self` proves AVX2.
             unsafe {
                 let zero = _mm256_setzero_ps();
                 [
@@ -391,67 +403,68 @@ mod arm {
     use super::{Block, Simd};
     use std::arch::aarch64::*;
 
-    /// Proof of NEON; made by `run_neon` alone.
+    /// Proof that the CPU has NEON; only `run_neon` makes one.
     #[derive(Clone, Copy)]
     pub struct Neon(pub(super) ());
 
-    type Four = [float32x4_t; 4];
+    /// The four quarters of a block.
+    type Quarters = [float32x4_t; 4];
 
     /// One operation on every quarter.
     #[inline(always)]
-    fn quarters(f: impl Fn(usize) -> float32x4_t) -> Four {
+    fn quarters(f: impl Fn(usize) -> float32x4_t) -> Quarters {
         [f(0), f(1), f(2), f(3)]
     }
 
     impl Simd for Neon {
-        type V = Four;
+        type V = Quarters;
         const ROWS: usize = 6;
 
         #[inline(always)]
-        fn splat(self, x: f32) -> Four {
-            // SAFETY: `self` proves NEON; so in all functions of this instance.
+        fn splat(self, x: f32) -> Quarters {
+            // SAFETY: `self` proves NEON.
             quarters(|_| unsafe { vdupq_n_f32(x) })
         }
         #[inline(always)]
-        fn load(self, x: &Block) -> Four {
-            // SAFETY: NEON as above; four floats lie behind each quarter's start.
+        fn load(self, x: &Block) -> Quarters {
+            // SAFETY: `self` proves NEON. Four floats lie from each quarter's start on.
             quarters(|i| unsafe { vld1q_f32(x.0[4 * i..4 * i + 4].as_ptr()) })
         }
         #[inline(always)]
-        fn store(self, x: Four, to: &mut Block) {
+        fn store(self, x: Quarters, to: &mut Block) {
             for (i, x) in x.into_iter().enumerate() {
-                // SAFETY: NEON as above; four floats lie behind each quarter's start, borrowed mutably.
+                // SAFETY: `self` proves NEON. Four floats lie from each quarter's start on, borrowed mutably.
                 unsafe { vst1q_f32(to.0[4 * i..4 * i + 4].as_mut_ptr(), x) }
             }
         }
         #[inline(always)]
-        fn add(self, a: Four, b: Four) -> Four {
-            // SAFETY: NEON as above.
+        fn add(self, a: Quarters, b: Quarters) -> Quarters {
+            // SAFETY: `self` proves NEON.
             quarters(|i| unsafe { vaddq_f32(a[i], b[i]) })
         }
         #[inline(always)]
-        fn sub(self, a: Four, b: Four) -> Four {
-            // SAFETY: NEON as above.
+        fn sub(self, a: Quarters, b: Quarters) -> Quarters {
+            // SAFETY: `self` proves NEON.
             quarters(|i| unsafe { vsubq_f32(a[i], b[i]) })
         }
         #[inline(always)]
-        fn mul(self, a: Four, b: Four) -> Four {
-            // SAFETY: NEON as above.
+        fn mul(self, a: Quarters, b: Quarters) -> Quarters {
+            // SAFETY: `self` proves NEON.
             quarters(|i| unsafe { vmulq_f32(a[i], b[i]) })
         }
         #[inline(always)]
-        fn mul_add(self, a: Four, b: Four, c: Four) -> Four {
-            // SAFETY: NEON as above.
+        fn mul_add(self, a: Quarters, b: Quarters, c: Quarters) -> Quarters {
+            // SAFETY: `self` proves NEON.
             quarters(|i| unsafe { vfmaq_f32(c[i], a[i], b[i]) })
         }
         #[inline(always)]
-        fn max(self, a: Four, b: Four) -> Four {
-            // SAFETY: NEON as above.
+        fn max(self, a: Quarters, b: Quarters) -> Quarters {
+            // SAFETY: `self` proves NEON.
             quarters(|i| unsafe { vbslq_f32(vcgtq_f32(a[i], b[i]), a[i], b[i]) })
         }
         #[inline(always)]
-        fn gate(self, x: Four, by: Four) -> Four {
-            // SAFETY: NEON as above.
+        fn where_positive(self, x: Quarters, by: Quarters) -> Quarters {
+            // SAFETY: `self` proves NEON.
             quarters(|i| unsafe {
                 let zero = vdupq_n_f32(0.0);
                 vbslq_f32(vcgtq_f32(by[i], zero), x[i], zero)

@@ -1,143 +1,34 @@
-//! Laws of the engine: it is the network, its gradient is the gradient, company and threads change nothing.
+//! Tests of the engine: it agrees with the reference, its gradient is the difference quotient, and a grid's results do not depend on the
+//! other grids or on the number of threads.
 
+use super::membrane::{MembraneGrid, Pyramid, membrane};
 use super::*;
-use crate::InputKind;
-use crate::reference::{Reference, membrane};
+use crate::fill::InputKind;
+use crate::reference::{self, ReferenceNetwork};
+use crate::testing::{self, Random, config, random_tensors, wide};
+use darn_geometry::grid::CELLS;
 
 const CELL: f64 = 1.0 / 64.0;
 
-/// A small generator of its own, so that the tests' numbers stay.
-pub(super) struct Random(pub u64);
+/// Planes of some grids.
+struct Grids {
+    positions: Vec<f32>,
+    known: Vec<f32>,
+}
 
-impl Random {
-    /// In −1..1.
-    pub fn next(&mut self) -> f32 {
-        self.0 = self
-            .0
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        (self.0 >> 40) as f32 / (1u64 << 23) as f32 - 1.0
+impl Grids {
+    fn new(count: usize) -> Grids {
+        let (positions, known) = testing::grids(count);
+        Grids { positions, known }
     }
 
-    pub fn values(&mut self, count: usize, size: f32) -> Vec<f32> {
-        (0..count).map(|_| self.next() * size).collect()
+    fn input(&self) -> EngineInput<'_> {
+        input(&self.positions, &self.known)
     }
 }
 
-pub(super) fn config(width: usize, input: InputKind) -> UnetConfig {
-    UnetConfig {
-        width,
-        input,
-        ..UnetConfig::default()
-    }
-}
-
-/// Random weights that keep activations O(1), with statistics away from zero and one.
-pub(super) fn tensors(width: usize) -> NamedTensors {
-    let mut random = Random(7);
-    let mut tensors = NamedTensors::new();
-    let mut put = |name: String, shape: Vec<usize>, middle: f32, size: f32| {
-        let values = random.values(shape.iter().product(), size);
-        let values = values.into_iter().map(|x| x + middle).collect();
-        tensors.insert(name, (shape, values));
-    };
-    let mut conv = |name: String, norm: String, [to, from, side]: [usize; 3]| {
-        let size = (6.0 / (from * side * side) as f32).sqrt();
-        put(
-            format!("{name}.weight"),
-            vec![to, from, side, side],
-            0.0,
-            size,
-        );
-        for (part, middle, size) in [
-            ("scale", 1.0, 0.3),
-            ("shift", 0.0, 0.3),
-            ("mean", 0.0, 0.3),
-            ("variance", 1.0, 0.3),
-        ] {
-            put(format!("{norm}.{part}"), vec![to], middle, size);
-        }
-    };
-    let block = |conv: &mut dyn FnMut(String, String, [usize; 3]), name: String, from, to| {
-        for (i, from) in [(0, from), (1, to)] {
-            conv(
-                format!("{name}.conv{i}"),
-                format!("{name}.norm{i}"),
-                [to, from, 3],
-            );
-        }
-    };
-    block(&mut conv, "down.0".into(), 4, width);
-    for level in 1..5 {
-        block(
-            &mut conv,
-            format!("down.{level}"),
-            width << (level - 1),
-            width << level,
-        );
-    }
-    for level in 0..4 {
-        let name = format!("up.{level}");
-        let (from, to) = (width << (level + 1), width << level);
-        let inner = (to / 2).max(1);
-        conv(
-            format!("{name}.conv"),
-            format!("{name}.norm"),
-            [to, from, 3],
-        );
-        for part in ["skip", "signal"] {
-            let part = format!("{name}.gate.{part}");
-            conv(part.clone(), format!("{part}_norm"), [inner, to, 1]);
-        }
-        block(&mut conv, format!("{name}.block"), 2 * to, to);
-    }
-    for level in 0..4 {
-        let inner = ((width << level) / 2).max(1);
-        put(
-            format!("up.{level}.gate.score.weight"),
-            vec![1, inner, 1, 1],
-            0.0,
-            1.0,
-        );
-        put(format!("up.{level}.gate.score.bias"), vec![1], 0.0, 1.0);
-    }
-    put("last.weight".into(), vec![3, width, 1, 1], 0.0, 1.0);
-    put("last.bias".into(), vec![3], 0.0, 1.0);
-    tensors
-}
-
-/// Waves with noise and a soft-edged hole at a different place in each grid.
-pub(super) fn grids(count: usize) -> (Vec<f32>, Vec<f32>) {
-    let mut random = Random(3);
-    let (mut positions, mut known) = (Vec::new(), Vec::new());
-    for grid in 0..count {
-        let mask: Vec<f32> = (0..CELLS)
-            .map(|at| {
-                let (i, j) = (
-                    (at % 64) as f32 - 20.0 - 7.0 * grid as f32,
-                    (at / 64) as f32 - 30.0,
-                );
-                ((i * i + j * j).sqrt() / 4.0 - 3.0 + 0.1 * random.next()).clamp(0.03, 0.97)
-            })
-            .collect();
-        for axis in 0..3 {
-            positions.extend((0..CELLS).map(|at| {
-                let (u, v) = ((at % 64) as f32 / 64.0, (at / 64) as f32 / 64.0);
-                let plane = [
-                    u - 0.5,
-                    v - 0.5,
-                    0.1 * (9.0 * u + 4.0 * v + grid as f32).sin(),
-                ];
-                plane[axis] + 0.003 * random.next()
-            }));
-        }
-        known.extend(mask);
-    }
-    (positions, known)
-}
-
-pub(super) fn input<'a>(positions: &'a [f32], known: &'a [f32]) -> Input<'a> {
-    Input {
+pub(super) fn input<'a>(positions: &'a [f32], known: &'a [f32]) -> EngineInput<'a> {
+    EngineInput {
         positions,
         known,
         base: None,
@@ -145,11 +36,7 @@ pub(super) fn input<'a>(positions: &'a [f32], known: &'a [f32]) -> Input<'a> {
     }
 }
 
-pub(super) fn wide(x: &[f32]) -> Vec<f64> {
-    x.iter().map(|x| f64::from(*x)).collect()
-}
-
-pub(super) fn targets() -> Vec<Isa> {
+pub(super) fn available() -> Vec<Isa> {
     Isa::ALL
         .into_iter()
         .filter(|isa| isa.is_available())
@@ -166,15 +53,9 @@ pub(super) fn engine(
     Engine::new(tensors, &config, EngineOptions { isa, threads }).unwrap()
 }
 
-fn predict(
-    engine: &Engine,
-    scratch: &mut Scratch,
-    (positions, known): (&[f32], &[f32]),
-) -> Vec<f32> {
-    let mut out = vec![f32::NAN; positions.len()];
-    engine
-        .predict(scratch, input(positions, known), &mut out)
-        .unwrap();
+fn predict(engine: &Engine, scratch: &mut Scratch, input: EngineInput) -> Vec<f32> {
+    let mut out = vec![f32::NAN; input.positions.len()];
+    engine.predict(scratch, input, &mut out).unwrap();
     out
 }
 
@@ -182,12 +63,15 @@ fn predict(
 fn gradient(
     engine: &Engine,
     scratch: &mut Scratch,
-    (positions, known): (&[f32], &[f32]),
+    input: EngineInput,
     cotangent: &[f32],
 ) -> [Vec<f32>; 3] {
+    let EngineInput {
+        positions, known, ..
+    } = input;
     let mut out = [positions.len(), positions.len(), known.len()].map(|n| vec![f32::NAN; n]);
     let [prediction, by_positions, by_known] = &mut out;
-    let room = Gradient {
+    let gradients = InputGradient {
         prediction,
         by_positions,
         by_known,
@@ -195,9 +79,7 @@ fn gradient(
     let given = |grid: usize, _: &[f32], to: &mut [f32]| {
         to.copy_from_slice(&cotangent[grid * 3 * CELLS..][..3 * CELLS]);
     };
-    engine
-        .gradient(scratch, input(positions, known), &given, room)
-        .unwrap();
+    engine.gradient(scratch, input, &given, gradients).unwrap();
     out
 }
 
@@ -208,28 +90,35 @@ fn largest_gap(a: &[f32], b: &[f64]) -> f64 {
 }
 
 #[test]
-fn the_engine_is_the_network() {
-    for (width, input) in [
+fn the_engine_agrees_with_the_reference() {
+    for (width, kind) in [
         (3, InputKind::Membrane),
         (8, InputKind::Zeros),
         (16, InputKind::Membrane),
         (24, InputKind::Zeros),
     ] {
-        let (tensors, config) = (tensors(width), config(width, input));
-        let (positions, mut known) = grids(1);
+        let config = config(width, kind);
+        let tensors = random_tensors(&config);
+        let Grids {
+            positions,
+            mut known,
+        } = Grids::new(1);
         if width == 16 {
             known.iter_mut().for_each(|k| *k = k.round());
         }
-        let reference = Reference {
+        let reference = ReferenceNetwork {
             tensors: &tensors,
             config,
         };
         let truth = reference.predict(&wide(&positions), &wide(&known));
         let size = truth.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
-        assert!(size > CELL, "the network must have a say in this test");
-        for isa in targets() {
+        assert!(
+            size > CELL,
+            "the network must change positions in this test"
+        );
+        for isa in available() {
             let engine = engine(&tensors, config, isa, 1);
-            let out = predict(&engine, &mut Scratch::default(), (&positions, &known));
+            let out = predict(&engine, &mut Scratch::default(), input(&positions, &known));
             let gap = largest_gap(&out, &truth);
             eprintln!("width {width} {}: {:.2e} cells", isa.name(), gap / CELL);
             assert!(gap < 1e-4 * CELL, "{} width {width}: {gap}", isa.name());
@@ -238,22 +127,25 @@ fn the_engine_is_the_network() {
 }
 
 #[test]
-fn the_membrane_is_the_membrane() {
-    let (positions, known) = grids(1);
+fn the_membrane_agrees_with_the_reference() {
+    let Grids { positions, known } = Grids::new(1);
     let mut holes = known.clone();
     holes.iter_mut().for_each(|k| *k = k.round());
     for known in [known, holes, vec![0.0; CELLS], vec![1.0; CELLS]] {
         let mut filled = vec![0.0; 3 * CELLS];
-        let mut pyramid = membrane::Pyramid::default();
-        membrane::membrane(
-            Target::best(),
-            &mut pyramid,
-            (&positions, &known),
+        let grid = MembraneGrid {
+            positions: &positions,
+            known: &known,
+        };
+        membrane(
+            TargetIsa::best(),
+            &mut Pyramid::default(),
+            grid,
             &mut filled,
         );
         for axis in 0..3 {
             let axis = axis * CELLS..(axis + 1) * CELLS;
-            let truth = membrane(&wide(&positions[axis.clone()]), &wide(&known), 0);
+            let truth = reference::membrane(&wide(&positions[axis.clone()]), &wide(&known));
             assert!(largest_gap(&filled[axis], &truth) < 1e-6);
         }
     }
@@ -261,12 +153,13 @@ fn the_membrane_is_the_membrane() {
 
 #[test]
 fn the_gradient_is_the_difference_quotient() {
-    for input in [InputKind::Membrane, InputKind::Zeros] {
-        let (tensors, config) = (tensors(3), config(3, input));
-        let (positions, known) = grids(1);
+    for kind in [InputKind::Membrane, InputKind::Zeros] {
+        let config = config(3, kind);
+        let tensors = random_tensors(&config);
+        let Grids { positions, known } = Grids::new(1);
         let mut random = Random(11);
         let cotangent = random.values(positions.len(), 1.0);
-        let reference = Reference {
+        let reference = ReferenceNetwork {
             tensors: &tensors,
             config,
         };
@@ -306,12 +199,12 @@ fn the_gradient_is_the_difference_quotient() {
                 (moved(1.0) - moved(-1.0)) / (2.0 * step)
             })
             .collect();
-        for isa in targets() {
+        for isa in available() {
             let engine = engine(&tensors, config, isa, 1);
             let mut scratch = Scratch::default();
             let [prediction, by_positions, by_known] =
-                gradient(&engine, &mut scratch, (&positions, &known), &cotangent);
-            let plain = predict(&engine, &mut scratch, (&positions, &known));
+                gradient(&engine, &mut scratch, input(&positions, &known), &cotangent);
+            let plain = predict(&engine, &mut scratch, input(&positions, &known));
             assert_eq!(prediction, plain);
             for ((dx, dk), quotient) in directions.iter().zip(&quotients) {
                 let dot = |a: &[f32], b: &[f32]| -> f64 {
@@ -322,7 +215,7 @@ fn the_gradient_is_the_difference_quotient() {
                 };
                 let slope = dot(&by_positions, dx) + dot(&by_known, dk);
                 let gap = (slope - quotient).abs() / quotient.abs().max(0.1);
-                eprintln!("{input:?} {}: {slope:.6} {quotient:.6}", isa.name());
+                eprintln!("{kind:?} {}: {slope:.6} {quotient:.6}", isa.name());
                 assert!(gap < 1e-3, "{}: {slope} {quotient}", isa.name());
             }
         }
@@ -330,11 +223,12 @@ fn the_gradient_is_the_difference_quotient() {
 }
 
 #[test]
-fn company_and_threads_change_nothing() {
-    let (tensors, config) = (tensors(5), config(5, InputKind::Membrane));
-    let (positions, known) = grids(7);
+fn results_do_not_depend_on_other_grids_or_threads() {
+    let config = config(5, InputKind::Membrane);
+    let tensors = random_tensors(&config);
+    let Grids { positions, known } = Grids::new(7);
     let cotangent = Random(5).values(positions.len(), 1.0);
-    for isa in targets() {
+    for isa in available() {
         let alone = engine(&tensors, config, isa, 1);
         let mut scratch = Scratch::default();
         let mut each = [Vec::new(), Vec::new(), Vec::new()];
@@ -343,7 +237,7 @@ fn company_and_threads_change_nothing() {
                 i * 3 * CELLS..(i + 1) * 3 * CELLS,
                 i * CELLS..(i + 1) * CELLS,
             );
-            let grid = (&positions[three.clone()], &known[one]);
+            let grid = input(&positions[three.clone()], &known[one]);
             let parts = gradient(&alone, &mut scratch, grid, &cotangent[three]);
             for (all, part) in each.iter_mut().zip(parts) {
                 all.extend(part);
@@ -351,14 +245,14 @@ fn company_and_threads_change_nothing() {
         }
         for threads in [1, 2, 3] {
             let engine = engine(&tensors, config, isa, threads);
-            let together = gradient(&engine, &mut scratch, (&positions, &known), &cotangent);
+            let together = gradient(&engine, &mut scratch, input(&positions, &known), &cotangent);
             assert!(together == each, "{} {threads}", isa.name());
-            let plain = predict(&engine, &mut scratch, (&positions, &known));
+            let plain = predict(&engine, &mut scratch, input(&positions, &known));
             assert!(plain == each[0], "{} {threads}", isa.name());
         }
         for threads in [2, 3, 7] {
             let engine = engine(&tensors, config, isa, threads);
-            let grid = (&positions[..3 * CELLS], &known[..CELLS]);
+            let grid = input(&positions[..3 * CELLS], &known[..CELLS]);
             let shared = gradient(&engine, &mut scratch, grid, &cotangent[..3 * CELLS]);
             let same = shared.iter().zip(&each).all(|(a, b)| *a == b[..a.len()]);
             assert!(same, "{} {threads}: one grid", isa.name());
@@ -368,21 +262,22 @@ fn company_and_threads_change_nothing() {
 
 #[test]
 fn instruction_sets_with_fused_products_agree_to_the_bit() {
-    let (tensors, config) = (tensors(4), config(4, InputKind::Membrane));
-    let (positions, known) = grids(2);
-    let fused = targets().into_iter().filter(|isa| *isa != Isa::Portable);
+    let config = config(4, InputKind::Membrane);
+    let tensors = random_tensors(&config);
+    let grids = Grids::new(2);
+    let fused = available().into_iter().filter(|isa| *isa != Isa::Portable);
     let answers: Vec<Vec<f32>> = fused
         .map(|isa| {
             let engine = engine(&tensors, config, isa, 1);
-            predict(&engine, &mut Scratch::default(), (&positions, &known))
+            predict(&engine, &mut Scratch::default(), grids.input())
         })
         .collect();
     assert!(answers.windows(2).all(|pair| pair[0] == pair[1]));
 }
 
 #[test]
-fn what_is_wrong_has_a_name() {
-    let mut weights = tensors(2);
+fn errors_name_what_is_wrong() {
+    let mut weights = random_tensors(&config(2, InputKind::Membrane));
     let wrong = |weights: &NamedTensors, width: usize| {
         let config = config(width, InputKind::Membrane);
         Engine::new(weights, &config, EngineOptions::default())
@@ -402,10 +297,12 @@ fn what_is_wrong_has_a_name() {
             .to_string()
             .contains("mmx")
     );
-    let engine = engine(&tensors(2), config(2, InputKind::Zeros), Isa::Portable, 1);
-    let (positions, known) = grids(1);
+    let config = config(2, InputKind::Zeros);
+    let engine = engine(&random_tensors(&config), config, Isa::Portable, 1);
+    let Grids { positions, known } = Grids::new(1);
     let mut out = vec![0.0; 5];
-    let short = engine.predict(&mut Scratch::default(), input(&positions, &known), &mut out);
+    let input = input(&positions, &known);
+    let short = engine.predict(&mut Scratch::default(), input, &mut out);
     assert!(short.unwrap_err().to_string().contains("`out`"));
 }
 
