@@ -1,6 +1,6 @@
 //! Generates the contract's types from `proto/`, without an installed `protoc`.
 //!
-//! protox parses the files; prost and tonic write messages and the gRPC service, pbjson the canonical proto3 JSON of the same messages.
+//! protox parses the files; prost writes the messages, pbjson their canonical proto3 JSON. The gRPC service is generated in `darn-serve`.
 //! The descriptor itself is kept beside them: the OpenAPI document takes its schemas from it, so that they cannot drift.
 
 use std::{env, error::Error, fs, path::PathBuf};
@@ -24,11 +24,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let bytes = descriptors.encode_to_vec();
     fs::write(out.join("darn.descriptors.bin"), &bytes)?;
 
-    tonic_prost_build::configure()
-        .compile_well_known_types(true)
+    prost_build::Config::new()
+        .compile_well_known_types()
         .extern_path(".google.protobuf", "::pbjson_types")
-        .bytes(".darn.v1")
-        .emit_rerun_if_changed(false)
+        .bytes([".darn.v1"])
         .compile_fds(descriptors)?;
 
     pbjson_build::Builder::new()

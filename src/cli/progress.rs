@@ -1,5 +1,8 @@
 //! Progress of long work: a bar on a terminal, log lines if there is no terminal.
 
+// Only commands of `darn-lab` count their work.
+#![cfg_attr(not(feature = "burn"), allow(dead_code))]
+
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -1,6 +1,7 @@
 //! The anchor search over HTTP and gRPC.
 
-use darn_contract::v1::{AnchorQuery, Constraints, ScanChunk, darn_client::DarnClient};
+use darn_contract::v1::{AnchorQuery, Constraints, ScanChunk};
+use darn_serve::generated::darn_client::DarnClient;
 use reqwest::{
     RequestBuilder,
     multipart::{Form, Part},

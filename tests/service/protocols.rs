@@ -1,8 +1,7 @@
 //! Successful answers over HTTP and gRPC, and the errors of gRPC.
 
-use darn_contract::v1::{
-    Anchor, Constraints, ScanChunk, darn_client::DarnClient, inpaint_chunk::Part as ChunkPart,
-};
+use darn_contract::v1::{Anchor, Constraints, ScanChunk, inpaint_chunk::Part as ChunkPart};
+use darn_serve::generated::darn_client::DarnClient;
 use reqwest::multipart::{Form, Part};
 use serde_json::Value;
 use tonic::{Code, codegen::tokio_stream};

@@ -4,7 +4,29 @@
 
 use std::fmt;
 
-use tonic::Code as Grpc;
+/// gRPC status codes, with their numbers (<https://grpc.io/docs/guides/status-codes/>); those that darn answers with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(i32)]
+pub enum GrpcCode {
+    /// The request itself is wrong.
+    InvalidArgument = 3,
+    /// Time ran out.
+    DeadlineExceeded = 4,
+    /// What is asked for is not there.
+    NotFound = 5,
+    /// A limit is reached.
+    ResourceExhausted = 8,
+    /// The request is right, but not for this scan.
+    FailedPrecondition = 9,
+    /// The request was broken off.
+    Aborted = 10,
+    /// No such method.
+    Unimplemented = 12,
+    /// An error of the service itself.
+    Internal = 13,
+    /// Not now; try again.
+    Unavailable = 14,
+}
 
 /// A row of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,7 +36,7 @@ pub struct Code {
     /// HTTP status.
     pub status: u16,
     /// gRPC status code.
-    pub grpc: Grpc,
+    pub grpc: GrpcCode,
 }
 
 impl fmt::Display for Code {
@@ -26,7 +48,7 @@ impl fmt::Display for Code {
 /// Writes one constant per row, and `ALL`, which lists them.
 macro_rules! codes {
     ($($(#[$doc:meta])* $name:ident = $word:literal, $status:literal, $grpc:ident;)*) => {
-        $($(#[$doc])* pub const $name: Code = Code { word: $word, status: $status, grpc: Grpc::$grpc };)*
+        $($(#[$doc])* pub const $name: Code = Code { word: $word, status: $status, grpc: GrpcCode::$grpc };)*
 
         /// Every code.
         pub const ALL: &[Code] = &[$($name),*];

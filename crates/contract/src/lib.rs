@@ -1,6 +1,6 @@
 //! What darn's parts and callers agree on: the messages generated from `proto/`, the check of a request's constraints and queries,
 //! the table of error codes, and the [`port`] through which the service asks for mends.
-//! May use: prost, pbjson, serde, tonic's generated-code support.
+//! May use: prost, pbjson, serde.
 //! May not live here: servers, geometry, anything that reads a scan.
 
 pub mod codes;
@@ -9,12 +9,12 @@ mod json;
 pub mod port;
 mod validate;
 
-pub use codes::Code;
+pub use codes::{Code, GrpcCode};
 pub use error_chain::error_chain;
 pub use json::{JsonError, from_json};
 pub use validate::{Anchor, Constraints, Edit, FieldError, Gesture, HoleSelector, Search};
 
-/// The messages and the gRPC service of `proto/darn/v1/darn.proto`, as generated.
+/// The messages of `proto/darn/v1/darn.proto`, as generated.
 #[allow(missing_docs, clippy::all, clippy::pedantic, rustdoc::all)]
 pub mod v1 {
     include!(concat!(env!("OUT_DIR"), "/darn.v1.rs"));

@@ -9,6 +9,7 @@ use std::{
 use bytes::{Bytes, BytesMut};
 use tonic::{Code, Request, Response, Status, Streaming, codegen::tokio_stream::Stream};
 
+use super::generated::darn_server::{Darn, DarnServer};
 use super::{
     app::App,
     body::{BodyTimer, ScanRequest},
@@ -19,11 +20,7 @@ use super::{
 use darn_contract::port::Mended;
 use darn_contract::{
     Constraints, Search,
-    v1::{
-        self, AnchorFound, HolesReport, InpaintChunk, ScanChunk,
-        darn_server::{Darn, DarnServer},
-        inpaint_chunk::Part,
-    },
+    v1::{self, AnchorFound, HolesReport, InpaintChunk, ScanChunk, inpaint_chunk::Part},
 };
 
 /// Bytes of a scan per message of an answer.

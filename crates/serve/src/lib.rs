@@ -10,6 +10,11 @@ mod config;
 mod connections;
 mod ended_sessions;
 mod error;
+/// The gRPC service of `proto/darn/v1/darn.proto` and a client of it, as generated.
+#[allow(missing_docs, clippy::all, clippy::pedantic, rustdoc::all)]
+pub mod generated {
+    include!(concat!(env!("OUT_DIR"), "/darn.v1.rs"));
+}
 mod grpc;
 mod healthcheck;
 mod job;

@@ -68,7 +68,10 @@ impl RequestError {
     /// they fit into the 8 KiB of headers that every client accepts.
     pub fn grpc(&self, request_id: &str) -> tonic::Status {
         let code = self.code();
-        let mut status = tonic::Status::new(code.grpc, cut(self.to_string(), GRPC_MESSAGE_BYTES));
+        let mut status = tonic::Status::new(
+            tonic::Code::from_i32(code.grpc as i32),
+            cut(self.to_string(), GRPC_MESSAGE_BYTES),
+        );
         let document = self.document(request_id).json_within(GRPC_DOCUMENT_BYTES);
         let metadata = status.metadata_mut();
         metadata.insert("darn-code", MetadataValue::from_static(code.word));
