@@ -10,8 +10,9 @@ use prost::Message as _;
 const FILES: [&str; 1] = ["darn/v1/darn.proto"];
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let root = PathBuf::from(env::var("CARGO_MANIFEST_DIR")?).join("../../proto");
-    let out = PathBuf::from(env::var("OUT_DIR")?);
+    let root = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").ok_or("no manifest directory")?)
+        .join("../../proto");
+    let out = PathBuf::from(env::var_os("OUT_DIR").ok_or("OUT_DIR is not set")?);
     for file in FILES {
         println!("cargo:rerun-if-changed={}", root.join(file).display());
     }

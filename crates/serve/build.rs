@@ -5,7 +5,8 @@ use std::{env, error::Error, path::PathBuf};
 const FILE: &str = "darn/v1/darn.proto";
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let root = PathBuf::from(env::var("CARGO_MANIFEST_DIR")?).join("../../proto");
+    let root = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").ok_or("no manifest directory")?)
+        .join("../../proto");
     println!("cargo:rerun-if-changed={}", root.join(FILE).display());
     let descriptors = protox::Compiler::new([&root])?
         .include_source_info(true)

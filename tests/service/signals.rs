@@ -21,8 +21,14 @@ const TIMEOUT: Duration = Duration::from_secs(10);
 #[test]
 #[ignore = "run by the test of signals"]
 fn serves_until_signalled() {
-    if let Ok(address) = std::env::var(ADDRESS) {
-        let settings = ["darn", "--listen", &address, "--drain", "60s"];
+    if let Some(address) = std::env::var_os(ADDRESS) {
+        let settings = [
+            "darn".into(),
+            "--listen".into(),
+            address,
+            "--drain".into(),
+            "60s".into(),
+        ];
         let settings = Settings::parse_from(settings).serve;
         run(&settings, Arc::new(FakeMender::default())).unwrap();
     }

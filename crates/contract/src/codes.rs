@@ -189,7 +189,7 @@ mod tests {
         for code in ALL {
             let ours = matches!(
                 code.grpc,
-                Grpc::Internal | Grpc::Unavailable | Grpc::DeadlineExceeded
+                GrpcCode::Internal | GrpcCode::Unavailable | GrpcCode::DeadlineExceeded
             );
             assert_eq!(code.status >= 500, ours, "{code}");
         }
