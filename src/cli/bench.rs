@@ -78,14 +78,14 @@ pub fn run(args: &BenchArgs) -> Result<(), Failure> {
 struct BenchRow<'a> {
     engine: String,
     what: &'static str,
-    size: PassSize,
+    size: BenchSize,
     call: TimedCall<'a>,
     milliseconds: Vec<f64>,
 }
 
 /// How many grids a pass has, and how many threads share it.
 #[derive(Debug, Clone, Copy)]
-struct PassSize {
+struct BenchSize {
     batch: usize,
     threads: usize,
 }
@@ -147,7 +147,7 @@ fn net(args: &BenchNetArgs) -> Result<(), Failure> {
         for (threads, engine) in &engines {
             let pool = pools.iter().find(|(t, _)| t == threads);
             let Some((_, pool)) = pool else { continue };
-            let size = PassSize {
+            let size = BenchSize {
                 batch: *batch,
                 threads: *threads,
             };
@@ -156,7 +156,7 @@ fn net(args: &BenchNetArgs) -> Result<(), Failure> {
         }
         for (name, network) in &networks {
             for (threads, pool) in &pools {
-                let size = PassSize {
+                let size = BenchSize {
                     batch: *batch,
                     threads: *threads,
                 };
@@ -294,7 +294,7 @@ fn network_passes<'a>(
 type TimedCall<'a> = Box<dyn FnMut() -> Result<(), NetError> + 'a>;
 
 /// The rows of an engine's two passes.
-fn bench_rows<'a>(engine: &str, size: PassSize, passes: Passes<'a>) -> [BenchRow<'a>; 2] {
+fn bench_rows<'a>(engine: &str, size: BenchSize, passes: Passes<'a>) -> [BenchRow<'a>; 2] {
     [("forward", passes.forward), ("gradient", passes.gradient)].map(|(what, call)| BenchRow {
         engine: engine.to_owned(),
         what,
@@ -313,7 +313,7 @@ fn print_json(rows: &mut [BenchRow]) {
     for row in rows {
         let (least, median) = spread(&mut row.milliseconds);
         let (engine, isa) = row.engine.split_once(' ').unwrap_or((&row.engine, ""));
-        let PassSize { batch, threads } = row.size;
+        let BenchSize { batch, threads } = row.size;
         let line = json!({
             "engine": engine, "isa": isa, "precision": "f32", "what": row.what, "batch": batch,
             "threads": threads, "least_ms": least, "median_ms": median,
@@ -328,7 +328,7 @@ fn print_table(rows: &mut [BenchRow], config: &UnetConfig) {
     );
     for row in rows {
         let (least, median) = spread(&mut row.milliseconds);
-        let PassSize { batch, threads } = row.size;
+        let BenchSize { batch, threads } = row.size;
         let rate = match row.what {
             "forward" => format!("{:.0}", gigaflops(config) * batch as f64 / median * 1e3),
             _ => String::new(),

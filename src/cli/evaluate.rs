@@ -18,7 +18,7 @@ use serde_json::json;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct EvaluateArgs {
     /// Folder of sheets to be measured on, as `darn scarffolds` makes it; none of them may have been trained on
     #[arg(long)]
     sheets: PathBuf,
@@ -56,7 +56,7 @@ pub struct Args {
     network: NetworkArgs,
 }
 
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub fn run(args: &EvaluateArgs) -> Result<(), Failure> {
     let name = args.sheets.display();
     let sheets = sheets::read(&args.sheets).or_fail(format!("read sheets in {name}"))?;
     if sheets.is_empty() || args.samples == 0 {
@@ -125,7 +125,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
 }
 
-impl Args {
+impl EvaluateArgs {
     /// Noise levels, ascending, with 0 among them.
     fn noises(&self) -> Vec<f64> {
         let mut all = self.noise.clone();
@@ -151,7 +151,11 @@ struct MaskRow {
 }
 
 /// Prints and writes the shares of the grid that holes take, in training samples and in flattened scans.
-fn masks(args: &Args, sheets: &[SimulatedSheet], trained: &[GridShares]) -> Result<(), Failure> {
+fn masks(
+    args: &EvaluateArgs,
+    sheets: &[SimulatedSheet],
+    trained: &[GridShares],
+) -> Result<(), Failure> {
     let mut rows = vec![MaskRow {
         name: "training samples".into(),
         refused: 0,

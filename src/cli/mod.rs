@@ -60,16 +60,16 @@ enum CliCommand {
     Healthcheck(healthcheck::HealthcheckArgs),
     /// Simulate sheets of cloth to train on
     #[cfg(feature = "burn")]
-    Scarffolds(scarffolds::Args),
+    Scarffolds(scarffolds::ScarffoldsArgs),
     /// Write samples to learn from to standard output, for a trainer outside this program
     #[cfg(feature = "burn")]
-    Samples(samples::Args),
+    Samples(samples::SamplesArgs),
     /// Train a network on simulated sheets
     #[cfg(feature = "burn")]
-    Train(train::Args),
+    Train(train::TrainArgs),
     /// Measure a network's fills on held-out sheets
     #[cfg(feature = "burn")]
-    Evaluate(evaluate::Args),
+    Evaluate(evaluate::EvaluateArgs),
     /// Measure how long the network and a mend take here
     Bench(bench::BenchArgs),
     /// Print the service's OpenAPI document

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 const TOGETHER: usize = 64;
 
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct SamplesArgs {
     /// Folder of sheets to learn from, as `darn scarffolds` makes it
     #[arg(long)]
     sheets: PathBuf,
@@ -38,7 +38,7 @@ pub struct Args {
     held_out: bool,
 }
 
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub fn run(args: &SamplesArgs) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     if out.is_terminal() {
         return Err(Failure::Usage(

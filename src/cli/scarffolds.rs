@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 const PICTURED: usize = 12;
 
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct ScarffoldsArgs {
     /// How many sheets
     #[arg(long)]
     count: usize,
@@ -44,7 +44,7 @@ enum Format {
     Glb,
 }
 
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub fn run(args: &ScarffoldsArgs) -> Result<(), Failure> {
     let progress = WorkProgress::counted("sheets", args.count as u64);
     let made = sheets::generate(args.count, args.seed, &args.out, &|finished| {
         progress.advance(finished as u64)

@@ -15,7 +15,7 @@ const BAR: u64 = 1000;
 const LINES: f64 = 50.0;
 
 #[derive(Debug, clap::Args)]
-pub struct Args {
+pub struct TrainArgs {
     /// Folder of sheets to learn from, as `darn scarffolds` makes it
     #[arg(long)]
     sheets: PathBuf,
@@ -173,7 +173,7 @@ impl Loss {
     }
 }
 
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub fn run(args: &TrainArgs) -> Result<(), Failure> {
     let mut output = ProgressOutput::new();
     let summary = darn_lab::train::run(&args.options(), &mut |progress| output.step(progress))
         .or_fail("train")?;
@@ -189,7 +189,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-impl Args {
+impl TrainArgs {
     fn weights(&self) -> LossWeights {
         let named = self.loss.weights();
         LossWeights {

@@ -37,17 +37,17 @@ pub(super) struct AccessorData<'c> {
     pub kind: Type,
     pub bytes: Vec<u8>,
     /// The bounds of the values, where glTF requires them.
-    pub bounds: Option<Bounds>,
+    pub bounds: Option<AccessorBounds>,
 }
 
 /// The smallest and the largest value of each component.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Bounds {
+pub(super) struct AccessorBounds {
     pub min: [f32; 3],
     pub max: [f32; 3],
 }
 
-impl Bounds {
+impl AccessorBounds {
     /// The bounds of a list of points.
     pub fn of(points: &[[f32; 3]]) -> Self {
         let mut bounds = Self {

@@ -6,7 +6,7 @@ use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::mesh::TRIANGLES;
 use serde_json::{Map, Value, json};
 
-use super::append::{AccessorData, Appender, Bounds};
+use super::append::{AccessorBounds, AccessorData, Appender};
 use super::buffers::BufferTarget;
 use super::container::float_bytes;
 use super::error::ScanError;
@@ -183,7 +183,7 @@ impl<'s> CheckedPatch<'s> {
     fn front(&self, out: &mut Appender<'_>, material: Option<usize>) -> Value {
         let patch = self.patch;
         let mut attributes = Map::new();
-        let bounds = Some(Bounds::of(&self.points));
+        let bounds = Some(AccessorBounds::of(&self.points));
         attributes.insert("POSITION".into(), self.floats(out, &self.points, bounds));
         if self.look.normals.is_some() {
             let normals = self.floats(out, &self.normals(), None);
@@ -212,7 +212,7 @@ impl<'s> CheckedPatch<'s> {
         let targets = if self.home.targets > 0 {
             // All primitives of a mesh must have the same number of targets; none moves the patch.
             let still = vec![[0.0; 3]; self.points.len()];
-            let still = self.floats(out, &still, Some(Bounds::of(&still)));
+            let still = self.floats(out, &still, Some(AccessorBounds::of(&still)));
             vec![json!({ "POSITION": still }); self.home.targets]
         } else {
             Vec::new()
@@ -247,7 +247,7 @@ impl<'s> CheckedPatch<'s> {
         &self,
         out: &mut Appender<'_>,
         rows: &[[f32; N]],
-        bounds: Option<Bounds>,
+        bounds: Option<AccessorBounds>,
     ) -> Value {
         out.accessor(AccessorData {
             name: &self.patch.name,

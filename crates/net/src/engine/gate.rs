@@ -266,7 +266,7 @@ pub struct Spans {
 
 /// Consecutive cells of one row.
 #[derive(Clone, Copy)]
-pub struct CellSpan {
+pub struct CellRange {
     /// Of its first cell in the run.
     pub offset: usize,
     image: usize,
@@ -275,7 +275,7 @@ pub struct CellSpan {
     column: usize,
 }
 
-impl CellSpan {
+impl CellRange {
     /// Index of the first cell in a channel block of a map.
     #[inline(always)]
     pub fn index(self, map: &FeatureMap, block: usize) -> usize {
@@ -293,11 +293,11 @@ impl Spans {
 
     /// The spans of a run of cells, counted through all images.
     #[inline(always)]
-    pub fn of(self, cells: Range<usize>) -> impl Iterator<Item = CellSpan> {
+    pub fn of(self, cells: Range<usize>) -> impl Iterator<Item = CellRange> {
         let area = self.side * self.side;
         cells.clone().step_by(self.length).map(move |cell| {
             let inside = cell % area;
-            CellSpan {
+            CellRange {
                 offset: cell - cells.start,
                 image: cell / area,
                 row: inside / self.side + 1,
