@@ -85,7 +85,7 @@ pub struct TrainArgs {
     /// Go on from the checkpoint in the output folder
     #[arg(long)]
     resume: bool,
-    /// RunStart from the weights in this file instead of random ones
+    /// Start from the weights in this file instead of random ones
     #[arg(long, conflicts_with = "resume")]
     from: Option<PathBuf>,
 }
