@@ -368,6 +368,7 @@ impl EditSession for FakeSession {
         let xs: Vec<f64> = constraints.anchors.iter().map(|a| a.position[0]).collect();
         Ok(Mended {
             bytes: format!("glTF {} {xs:?}", self.scan.name).into_bytes(),
+            media_type: "model/gltf-binary",
             report: report(constraints),
         })
     }
@@ -391,6 +392,7 @@ impl Mender for FakeMender {
         self.act_on_scan(&scan)?;
         Ok(Mended {
             bytes: mended(&scan),
+            media_type: "model/gltf-binary",
             report: report(constraints),
         })
     }

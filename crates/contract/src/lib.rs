@@ -1,7 +1,7 @@
 //! What darn's parts and callers agree on: the messages generated from `proto/`, the check of a request's constraints and queries,
 //! the table of error codes, and the [`port`] through which the service asks for mends.
-//! May use: prost, pbjson, serde.
-//! May not live here: servers, geometry, anything that reads a scan.
+//!
+//! It knows no HTTP and no gRPC, no geometry, and nothing that reads a scan.
 
 pub mod codes;
 mod error_chain;

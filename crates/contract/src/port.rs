@@ -13,6 +13,8 @@ use crate::{Code, Constraints, FieldError, Search, codes, v1};
 pub struct Mended {
     /// The glTF, in the container of the input: GLB or JSON.
     pub bytes: Vec<u8>,
+    /// The media type of that container.
+    pub media_type: &'static str,
     /// What was done.
     pub report: v1::Report,
 }

@@ -3,7 +3,6 @@
 //! [`scarffolds`] simulates draped squares and draws samples from them. [`unet`] is the paper's attention U-Net in burn, the definition that
 //! the engine of `darn-net` is tested against. [`train`] trains it. [`evaluate`] measures fills on sheets whose truth is known. This is the only
 //! crate that depends on burn; requests use [`unet::load_network`] only.
-#![warn(missing_docs)]
 
 mod cell_normals;
 mod line_chart;

@@ -195,7 +195,11 @@ impl ScanHoles {
             timings.write = milliseconds(started);
             timings.total += additions_ms + timings.write;
         }
-        Ok(Mended { bytes, report })
+        Ok(Mended {
+            bytes,
+            media_type: scan.container().media_type(),
+            report,
+        })
     }
 
     /// The patches in the scan's terms.

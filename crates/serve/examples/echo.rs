@@ -30,7 +30,11 @@ impl Mender for Echo {
     ) -> Result<Mended, Refusal> {
         let bytes = scan.into();
         let report = v1::Report::default();
-        Ok(Mended { bytes, report })
+        Ok(Mended {
+            bytes,
+            media_type: "model/gltf-binary",
+            report,
+        })
     }
 
     fn find_holes(&self, _: Bytes) -> Result<v1::HolesReport, Refusal> {

@@ -1,7 +1,7 @@
 //! The service: HTTP and gRPC in front of any [`Mender`], with settings, a worker pool, sessions, problem documents, metrics, logs
 //! and shutdown.
-//! May use: darn-contract, axum, tonic, tokio.
-//! May not live here: geometry, glTF, networks, anything that blocks an async thread.
+//!
+//! It knows no geometry, no glTF and no networks, and nothing in it blocks an async thread.
 
 mod accept;
 mod app;

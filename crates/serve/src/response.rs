@@ -45,10 +45,9 @@ pub struct MendResponse {
 
 impl From<Mended> for MendResponse {
     fn from(mended: Mended) -> Self {
-        let is_binary = mended.bytes.starts_with(b"glTF");
         Self {
             part: "scan",
-            media_type: if is_binary { GLB } else { GLTF },
+            media_type: mended.media_type,
             bytes: mended.bytes,
             report: mended.report,
         }

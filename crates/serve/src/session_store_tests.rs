@@ -1,5 +1,6 @@
 //! Tests of the sessions. Time is passed in, so nothing waits.
 
+use crate::media_types::GLB;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use proptest::prelude::*;
@@ -47,7 +48,11 @@ impl EditSession for SizedSession {
     fn mended(&self, constraints: &Constraints, _: Cancellation<'_>) -> Result<Mended, Refusal> {
         let bytes = vec![0; constraints.anchors.len()];
         let report = v1::Report::default();
-        Ok(Mended { bytes, report })
+        Ok(Mended {
+            bytes,
+            media_type: GLB,
+            report,
+        })
     }
 
     fn optimize_anchor(&self, _: &Search, _: Cancellation<'_>) -> Result<v1::AnchorFound, Refusal> {
