@@ -8,7 +8,7 @@ use axum::{
 use serde::Serialize;
 use uuid::Uuid;
 
-use super::media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, OCTET_STREAM};
+use super::media_types::{GLB, JSON, MULTIPART_MIXED, OCTET_STREAM};
 use darn_contract::port::{Mended, PatchForm, Patches};
 use darn_contract::v1;
 
