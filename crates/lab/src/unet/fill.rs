@@ -8,7 +8,7 @@ use darn_geometry::grid::SIDE;
 use darn_net::fill::{NOTHING, SATURATION, SWEEPS};
 
 /// The base plus the membrane of the known positions' offsets from it; without a base the membrane of the positions. Shapes as in
-/// [`membrane`].
+/// `membrane`.
 pub fn fill_over_base<B: Backend>(
     base: Option<Tensor<B, 4>>,
     positions: Tensor<B, 4>,
