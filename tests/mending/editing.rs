@@ -6,7 +6,7 @@ use darn_contract::port::Cancellation;
 use darn_contract::{Anchor, Constraints, Edit, Gesture, Search};
 use darn_geometry::mesh::{Vec2, Vec3};
 use darn_lab::scarffolds::sheets::SimulatedSheet;
-use darn_mend::ScanSession;
+use darn_mend::{ScanSession, SessionCall};
 
 use super::cloth::{ROUND, holed, laid, mended, mender, packed, read, sheet};
 
@@ -23,6 +23,10 @@ struct EditedSheet {
 }
 
 impl EditedSheet {
+    fn call(&self) -> SessionCall<'_> {
+        self.session.call(Cancellation::NEVER)
+    }
+
     fn of(sheet: &SimulatedSheet) -> EditedSheet {
         let scan = read(&packed(&holed(sheet, &ROUND).mesh, &[]));
         let session = ScanSession::open(
@@ -125,11 +129,7 @@ fn anchors_on_the_unedited_cloth_change_it_by_less_than_a_tenth_of_a_cell() {
         let cloth = EditedSheet::of(sheet(k));
         let places = [[0.0, 0.0], [0.5, 0.2], [-0.3, -0.5]];
         let anchors = places.map(|at| cloth.anchor(cloth.vertex(at), Vec3::zeros()));
-        let (positions, report) = cloth
-            .session
-            .call(Cancellation::NEVER)
-            .positions(&anchored(anchors.to_vec()))
-            .unwrap();
+        let (positions, report) = cloth.call().positions(&anchored(anchors.to_vec())).unwrap();
         let off = rms(&positions[0], &cloth.positions) / cloth.cell;
         assert!(off < 0.1, "sheet {k}: {off} cells");
         assert!(
@@ -148,11 +148,7 @@ fn an_anchor_two_cells_off_is_met() {
         let vertex = cloth.vertex([0.1, -0.1]);
         let by = cloth.across(vertex) * 2.0 * cloth.cell;
         let asked = anchored(vec![cloth.anchor(vertex, by)]);
-        let (positions, report) = cloth
-            .session
-            .call(Cancellation::NEVER)
-            .positions(&asked)
-            .unwrap();
+        let (positions, report) = cloth.call().positions(&asked).unwrap();
         let told = &report.holes[0].anchors[0];
         let off = (positions[0][vertex] - cloth.positions[vertex] - by).norm();
         assert!((off - told.distance).abs() < 1e-6 * cloth.cell);
@@ -172,18 +168,10 @@ fn an_anchor_ten_holes_away_neither_tears_nor_inflates_the_cloth() {
         let vertex = cloth.vertex([0.0, 0.0]);
         let by = cloth.across(vertex) * 10.0 * cloth.extent;
         let asked = anchored(vec![cloth.anchor(vertex, by)]);
-        let (positions, report) = cloth
-            .session
-            .call(Cancellation::NEVER)
-            .positions(&asked)
-            .unwrap();
+        let (positions, report) = cloth.call().positions(&asked).unwrap();
         let hole = &report.holes[0];
         let stretch = hole.patch.as_ref().unwrap().stretch_max;
-        let (_, free) = cloth
-            .session
-            .call(Cancellation::NEVER)
-            .positions(&Constraints::default())
-            .unwrap();
+        let (_, free) = cloth.call().positions(&Constraints::default()).unwrap();
         let usual = free.holes[0].patch.as_ref().unwrap().stretch_max;
         assert!(
             stretch <= 1.25f64.max(1.05 * usual) + 1e-6,
@@ -209,21 +197,13 @@ fn a_hard_anchor_is_met_or_refused_with_the_numbers() {
     };
     let far = hard(cloth.across(vertex) * 10.0 * cloth.extent);
     let soft = cloth.anchor(vertex, Vec3::zeros());
-    let error = (cloth
-        .session
-        .call(Cancellation::NEVER)
-        .positions(&anchored(vec![soft, far])))
-    .unwrap_err();
+    let error = (cloth.call().positions(&anchored(vec![soft, far]))).unwrap_err();
     assert_eq!(error.code().word, "anchor_out_of_reach");
     assert_eq!(error.fields()[0].pointer, "/anchors/1");
     assert!(error.fields()[0].detail.contains("beyond"), "{error}");
 
     let near = hard(cloth.across(vertex) * 0.5 * cloth.cell);
-    let (_, report) = cloth
-        .session
-        .call(Cancellation::NEVER)
-        .positions(&anchored(vec![near]))
-        .unwrap();
+    let (_, report) = cloth.call().positions(&anchored(vec![near])).unwrap();
     assert!(report.holes[0].anchors[0].distance <= 1e-3 * cloth.extent);
 }
 
@@ -254,11 +234,7 @@ fn a_soft_anchor_at_the_rim_does_not_keep_a_hard_one_from_being_met() {
             position: (at + cloth.across(middle) * 0.5 * cloth.cell).into(),
             hard: false,
         };
-        let (_, report) = (cloth
-            .session
-            .call(Cancellation::NEVER)
-            .positions(&anchored(vec![hard, soft])))
-        .unwrap();
+        let (_, report) = (cloth.call().positions(&anchored(vec![hard, soft]))).unwrap();
         assert!(report.holes[0].anchors[0].distance <= 1e-3 * cloth.extent);
     }
 }
@@ -272,13 +248,9 @@ fn gestures_compose_in_order() {
         uv,
         offset: (up * share).into(),
     };
-    let (once, report) = cloth
-        .session
-        .call(Cancellation::NEVER)
-        .positions(&edited(&[grab(1.5)]))
-        .unwrap();
-    let (twice, _) = (cloth.session)
-        .call(Cancellation::NEVER)
+    let (once, report) = cloth.call().positions(&edited(&[grab(1.5)])).unwrap();
+    let (twice, _) = cloth
+        .call()
         .positions(&edited(&[grab(1.0), grab(0.5)]))
         .unwrap();
     assert!(rms(&once[0], &twice[0]) < 1e-6 * cloth.cell);
@@ -292,11 +264,7 @@ fn gestures_compose_in_order() {
         angle,
     };
     let asked = edited(&[twist(0.5), twist(-0.5)]);
-    let (back, report) = cloth
-        .session
-        .call(Cancellation::NEVER)
-        .positions(&asked)
-        .unwrap();
+    let (back, report) = cloth.call().positions(&asked).unwrap();
     let off = rms(&back[0], &cloth.positions) / cloth.cell;
     assert!(off < 0.25, "a twist and its inverse: {off} cells");
     assert!(report.holes[0].edits[0].anchors > 5);
@@ -325,21 +293,13 @@ fn the_search_finds_the_cell_that_trying_all_finds() {
         exhaustive: false,
         map: false,
     };
-    let found = cloth
-        .session
-        .call(Cancellation::NEVER)
-        .optimize_anchor(&search)
-        .unwrap();
+    let found = cloth.call().optimize_anchor(&search).unwrap();
     let all = Search {
         exhaustive: true,
         map: true,
         ..search
     };
-    let best = cloth
-        .session
-        .call(Cancellation::NEVER)
-        .optimize_anchor(&all)
-        .unwrap();
+    let best = cloth.call().optimize_anchor(&all).unwrap();
     let apart = |d: usize| f64::from(found.cell[d]) - f64::from(best.cell[d]);
     assert!(
         apart(0).hypot(apart(1)) <= 2.0 || found.loss <= 1.1 * best.loss,
@@ -359,11 +319,7 @@ fn the_search_finds_the_cell_that_trying_all_finds() {
         uv: None,
         ..cloth.anchor(vertex, target - cloth.positions[vertex])
     }]);
-    let (_, report) = cloth
-        .session
-        .call(Cancellation::NEVER)
-        .positions(&asked)
-        .unwrap();
+    let (_, report) = cloth.call().positions(&asked).unwrap();
     assert_eq!(report.holes[0].anchors[0].uv, found.uv);
 }
 
@@ -377,11 +333,7 @@ fn a_target_of_1e17_is_searched_for() {
         exhaustive: false,
         map: false,
     };
-    let found = cloth
-        .session
-        .call(Cancellation::NEVER)
-        .optimize_anchor(&search)
-        .unwrap();
+    let found = cloth.call().optimize_anchor(&search).unwrap();
     assert!(found.loss.is_finite() && found.distance > 9e16);
     let asked = anchored(vec![Anchor {
         hole: None,
@@ -389,11 +341,7 @@ fn a_target_of_1e17_is_searched_for() {
         position: search.target,
         hard: false,
     }]);
-    let (positions, _) = cloth
-        .session
-        .call(Cancellation::NEVER)
-        .positions(&asked)
-        .unwrap();
+    let (positions, _) = cloth.call().positions(&asked).unwrap();
     assert!(positions[0].iter().all(|p| p.norm() < 1e3));
 }
 
