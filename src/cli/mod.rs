@@ -28,7 +28,7 @@ mod train;
 
 use crate::settings::ServeCommand;
 use clap::{Parser, Subcommand};
-use darn_serve::{LogFormat, start_logging};
+use darn_serve::{LogDelivery, LogFormat, LogGuard, start_logging, write_to_stderr};
 use failure::Failure;
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -92,7 +92,7 @@ pub fn main() -> ExitCode {
     match run(cli.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            eprintln!("darn: {failure}");
+            write_to_stderr(&format!("darn: {failure}"));
             ExitCode::from(failure.code())
         }
     }
@@ -100,9 +100,10 @@ pub fn main() -> ExitCode {
 
 fn run(command: CliCommand) -> Result<(), Failure> {
     // The service starts logging with its own settings.
-    if !matches!(command, CliCommand::Serve(_)) {
-        start_logging(command_log(), LogFormat::Text).map_err(Failure::Usage)?;
-    }
+    let _log = match command {
+        CliCommand::Serve(_) => None,
+        _ => Some(start_command_log()?),
+    };
     match command {
         CliCommand::Serve(settings) => serve::run(&settings),
         CliCommand::Inpaint(args) => inpaint::run(&args),
@@ -121,6 +122,11 @@ fn run(command: CliCommand) -> Result<(), Failure> {
         CliCommand::Bench(args) => bench::run(&args),
         CliCommand::Openapi => openapi::run(),
     }
+}
+
+fn start_command_log() -> Result<LogGuard, Failure> {
+    start_logging(command_log(), LogFormat::Text, LogDelivery::Patient)
+        .map_err(|error| Failure::Usage(error.to_string()))
 }
 
 /// The log filter of a command: warnings, and progress if no terminal shows a bar.

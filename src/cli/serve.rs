@@ -4,14 +4,22 @@ use super::failure::{Failure, OrFail};
 use super::network;
 use crate::settings::ServeCommand;
 use darn_mend::{NetworkMender, SharedMender};
-use darn_serve::start_logging;
+use darn_serve::{LogDelivery, LogError, start_logging};
 use std::sync::Arc;
 
 /// Runs `darn serve`.
 pub fn run(settings: &ServeCommand) -> Result<(), Failure> {
     let serve = &settings.serve;
-    start_logging(&serve.log, serve.log_format)
-        .map_err(|error| Failure::Usage(format!("--log {}: {error}", serve.log)))?;
+    let _log =
+        start_logging(&serve.log, serve.log_format, LogDelivery::Queued).map_err(|error| {
+            match error {
+                LogError::Filter(error) => Failure::Usage(format!("--log {}: {error}", serve.log)),
+                LogError::Thread(_) => Failure::Failed {
+                    doing: "start logging".to_owned(),
+                    cause: error.into(),
+                },
+            }
+        })?;
     if let Some(threads) = settings.threads {
         (rayon::ThreadPoolBuilder::new()
             .num_threads(threads)

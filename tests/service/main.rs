@@ -5,6 +5,7 @@ mod fake;
 mod faults;
 mod harness;
 mod load;
+mod logs;
 mod openapi;
 mod protocols;
 mod sessions;

@@ -9,17 +9,17 @@ use std::{
 };
 
 use clap::Parser;
-use darn_serve::{healthcheck, run};
+use darn_serve::{LogDelivery, LogFormat, healthcheck, run, start_logging};
 
 use crate::fake::{FakeMender, FakeScan};
 use crate::harness::Settings;
 
 const ADDRESS: &str = "DARN_TEST_SIGNALS_ADDRESS";
-const TIMEOUT: Duration = Duration::from_secs(10);
+pub const TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Not a test: what the other process runs.
 #[test]
-#[ignore = "run by the test of signals"]
+#[ignore = "run by the tests of signals and logs"]
 fn serves_until_signalled() {
     if let Some(address) = std::env::var_os(ADDRESS) {
         let settings = [
@@ -30,17 +30,43 @@ fn serves_until_signalled() {
             "60s".into(),
         ];
         let settings = Settings::parse_from(settings).serve;
+        let _log = start_logging("info", LogFormat::Text, LogDelivery::Queued).unwrap();
         run(&settings, Arc::new(FakeMender::default())).unwrap();
     }
 }
 
-fn signal(child: &Child) {
+/// A service in another process, not started yet, and its address; `program` runs the test program with the arguments after it.
+pub fn service_behind(mut program: Command) -> (Command, SocketAddr) {
+    let free = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = free.local_addr().unwrap();
+    program
+        .args(["--exact", "signals::serves_until_signalled", "--ignored"])
+        .args(["--test-threads", "1"])
+        .env(ADDRESS, address.to_string())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
+    (program, address)
+}
+
+/// Starts a service in another process, whose log goes to `stderr`, and waits until it is ready.
+pub fn start(stderr: Stdio) -> (Child, SocketAddr) {
+    let (mut program, address) = service_behind(Command::new(std::env::current_exe().unwrap()));
+    let child = program.stderr(stderr).spawn().unwrap();
+    let end = Instant::now() + TIMEOUT;
+    while healthcheck(address, TIMEOUT).is_err() {
+        assert!(Instant::now() < end, "the service never was ready");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    (child, address)
+}
+
+pub fn signal(child: &Child) {
     let id = child.id().to_string();
     let sent = Command::new("kill").args(["-TERM", &id]).status();
     assert!(sent.unwrap().success());
 }
 
-fn metrics(address: SocketAddr) -> String {
+pub fn metrics(address: SocketAddr) -> String {
     let mut stream = TcpStream::connect(address).unwrap();
     stream
         .write_all(b"GET /metrics HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n")
@@ -50,7 +76,7 @@ fn metrics(address: SocketAddr) -> String {
     text
 }
 
-fn ends(child: &mut Child, within: Duration) -> bool {
+pub fn ends(child: &mut Child, within: Duration) -> bool {
     let end = Instant::now() + within;
     while Instant::now() < end {
         if child.try_wait().unwrap().is_some() {
@@ -63,21 +89,7 @@ fn ends(child: &mut Child, within: Duration) -> bool {
 
 #[test]
 fn a_second_signal_ends_the_service_at_once() {
-    let free = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address: SocketAddr = free.local_addr().unwrap();
-    drop(free);
-    let mut child = Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "signals::serves_until_signalled", "--ignored"])
-        .env(ADDRESS, address.to_string())
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    let end = Instant::now() + TIMEOUT;
-    while healthcheck(address, TIMEOUT).is_err() {
-        assert!(Instant::now() < end, "the service never was ready");
-        std::thread::sleep(Duration::from_millis(10));
-    }
+    let (mut child, address) = start(Stdio::null());
 
     // A running job, which the drain waits for.
     let mut held = TcpStream::connect(address).unwrap();
@@ -88,6 +100,7 @@ fn a_second_signal_ends_the_service_at_once() {
     );
     held.write_all(head.as_bytes()).unwrap();
     held.write_all(&scan).unwrap();
+    let end = Instant::now() + TIMEOUT;
     while !metrics(address).contains("darn_jobs{state=\"running\"} 1") {
         assert!(Instant::now() < end, "the work never began");
         std::thread::sleep(Duration::from_millis(10));

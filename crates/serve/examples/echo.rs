@@ -11,7 +11,7 @@ use bytes::Bytes;
 use clap::Parser;
 use darn_contract::port::{Cancellation, EditSession, Mended, Mender, Refusal};
 use darn_contract::{Constraints, Search, codes, v1};
-use darn_serve::{ServeArgs, ServeError, run, start_logging};
+use darn_serve::{LogDelivery, LogError, ServeArgs, ServeError, run, start_logging};
 
 #[derive(Parser)]
 struct Args {
@@ -72,10 +72,17 @@ fn no_holes() -> Refusal {
     Refusal::new(codes::NO_HOLES, "this mender finds no holes")
 }
 
-fn main() -> Result<(), ServeError> {
-    let args = Args::parse();
-    if let Err(error) = start_logging(&args.serve.log, args.serve.log_format) {
-        eprintln!("{error}");
-    }
-    run(&args.serve, Arc::new(Echo))
+/// Why this example ended.
+#[derive(Debug, thiserror::Error)]
+enum EchoError {
+    #[error(transparent)]
+    Log(#[from] LogError),
+    #[error(transparent)]
+    Serve(#[from] ServeError),
+}
+
+fn main() -> Result<(), EchoError> {
+    let args = Args::parse().serve;
+    let _log = start_logging(&args.log, args.log_format, LogDelivery::Queued)?;
+    Ok(run(&args, Arc::new(Echo))?)
 }

@@ -3,6 +3,8 @@
 //!
 //! It knows no geometry, no glTF and no networks, and nothing in it blocks an async thread.
 
+#![warn(clippy::print_stderr, clippy::print_stdout)]
+
 mod accept;
 mod app;
 mod body;
@@ -19,6 +21,7 @@ mod grpc;
 mod healthcheck;
 mod job;
 mod kept_session;
+mod log_queue;
 mod media_types;
 pub mod openapi;
 mod parameters;
@@ -48,7 +51,8 @@ pub use self::{
     app::App,
     config::ServeArgs,
     healthcheck::{HealthError, healthcheck},
-    telemetry::{LogFormat, start_logging},
+    log_queue::{LogGuard, write_to_stderr},
+    telemetry::{LogDelivery, LogError, LogFormat, start_logging},
 };
 use darn_contract::port::Mender;
 

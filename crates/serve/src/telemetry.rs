@@ -1,6 +1,10 @@
-//! Logs, request ids and metrics. Metric labels come from a small fixed set: never an id or a caller's path.
+//! Logs, request ids and metrics. How log lines are written is in [`super::log_queue`]. Metric labels come from a small fixed set: never an id or a caller's path.
 
-use std::{io::IsTerminal, panic, time::Duration};
+use std::{
+    io::{self, IsTerminal},
+    panic,
+    time::Duration,
+};
 
 use axum::http::{HeaderMap, HeaderName};
 use clap::ValueEnum;
@@ -8,14 +12,15 @@ use metrics::{Counter, Gauge, Histogram, Key, Label, Level, Metadata, Recorder a
 use metrics_exporter_prometheus::{
     BuildError, PrometheusBuilder, PrometheusHandle, PrometheusRecorder,
 };
-use tracing::error;
+use tracing::{dispatcher, error};
 use tracing_subscriber::filter::{ParseError, Targets};
-use tracing_subscriber::fmt::layer;
+use tracing_subscriber::fmt::{layer, writer::BoxMakeWriter};
 use tracing_subscriber::layer::{Layer, SubscriberExt};
 use tracing_subscriber::util::SubscriberInitExt;
 use tracing_subscriber::{Registry, registry};
 use uuid::Uuid;
 
+use super::log_queue::{self, LogGuard, LogQueue, PatientStderr};
 use darn_contract::v1;
 
 /// The header that carries a request's id, in requests and answers.
@@ -53,18 +58,51 @@ pub enum LogFormat {
     Json,
 }
 
-/// Starts logging to standard error and logs panics. A second call does nothing.
+/// Who waits when the reader of the log is slow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LogDelivery {
+    /// Nobody: lines wait in a queue of bounded size; those that find no room are dropped and counted. For a service.
+    Queued,
+    /// Whoever logs: no line is dropped unless standard error refuses it. For a command.
+    Patient,
+}
+
+/// Why logging was not started.
+#[derive(Debug, thiserror::Error)]
+pub enum LogError {
+    /// The filter does not parse.
+    #[error("{0}")]
+    Filter(#[from] ParseError),
+    /// The thread that writes the lines cannot be started.
+    #[error("the thread that writes the log cannot be started: {0}")]
+    Thread(#[from] io::Error),
+}
+
+/// Starts logging to standard error and logs panics; an error of standard error is never one of whoever logs. A second call does nothing.
+/// Drop the guard at the end of the process.
 ///
 /// # Errors
-/// The filter does not parse.
-pub fn start_logging(filter: &str, format: LogFormat) -> Result<(), String> {
+/// See [`LogError`].
+pub fn start_logging(
+    filter: &str,
+    format: LogFormat,
+    delivery: LogDelivery,
+) -> Result<LogGuard, LogError> {
     // Not `EnvFilter`: its span filters would cost a regular expression engine, a tenth of a first build.
-    let filter: Targets = filter
-        .parse()
-        .map_err(|error: ParseError| error.to_string())?;
+    let filter: Targets = filter.parse()?;
+    // A test or an embedding program has already set a subscriber, which is kept.
+    if dispatcher::has_been_set() {
+        return Ok(LogGuard::new());
+    }
+    let writer = match delivery {
+        LogDelivery::Queued => BoxMakeWriter::new(LogQueue::of_process()?.clone()),
+        LogDelivery::Patient => BoxMakeWriter::new(|| PatientStderr),
+    };
     let lines = layer()
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal());
+        .with_writer(writer)
+        .with_ansi(io::stderr().is_terminal())
+        // It would say them with `eprintln!`, which panics when standard error fails.
+        .log_internal_errors(false);
     let lines: Box<dyn Layer<Registry> + Send + Sync> = match format {
         LogFormat::Text => lines.boxed(),
         LogFormat::Json => lines
@@ -74,7 +112,6 @@ pub fn start_logging(filter: &str, format: LogFormat) -> Result<(), String> {
             .boxed(),
     };
     let started = registry().with(lines.with_filter(filter)).try_init();
-    // It fails when a test or an embedding program has already set a subscriber, which is kept.
     if started.is_ok() {
         panic::set_hook(Box::new(|info| {
             let message = info.payload_as_str().unwrap_or("no message");
@@ -82,7 +119,7 @@ pub fn start_logging(filter: &str, format: LogFormat) -> Result<(), String> {
             error!(message, place, "panicked");
         }));
     }
-    Ok(())
+    Ok(LogGuard::new())
 }
 
 /// The metrics of the worker pool.
@@ -137,6 +174,8 @@ impl std::fmt::Debug for Metrics {
 const BUCKETS: [f64; 15] = [
     0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0,
 ];
+/// The counter of log lines that were not written.
+const LOG_LINES_DROPPED: &str = "darn_log_lines_dropped_total";
 const METADATA: Metadata<'static> = Metadata::new("darn", Level::INFO, None);
 
 impl Metrics {
@@ -195,6 +234,11 @@ impl Metrics {
             "darn_sessions_ended_total".into(),
             None,
             "sessions ended, by reason".into(),
+        );
+        recorder.describe_counter(
+            LOG_LINES_DROPPED.into(),
+            None,
+            "log lines of this process that were not written, by reason".into(),
         );
         let handle = recorder.handle();
         Ok(Self { recorder, handle })
@@ -276,6 +320,14 @@ impl Metrics {
 
     /// The metrics in the Prometheus text format.
     pub fn render(&self) -> String {
+        let dropped = log_queue::dropped_lines();
+        for (reason, lines) in [
+            ("queue_full", dropped.queue_full),
+            ("write_failed", dropped.write_failed),
+        ] {
+            self.counter(LOG_LINES_DROPPED, vec![Label::new("reason", reason)])
+                .absolute(lines);
+        }
         self.handle.render()
     }
 
