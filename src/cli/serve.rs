@@ -20,12 +20,11 @@ pub fn run(settings: &ServeCommand) -> Result<(), Failure> {
                 },
             }
         })?;
-    if let Some(threads) = settings.threads {
-        (rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build_global())
-        .or_fail("start threads")?;
-    }
+    // Here and not at the first mend, where an error would be a panic. 0: as many as processors.
+    (rayon::ThreadPoolBuilder::new()
+        .num_threads(settings.threads.unwrap_or(0))
+        .build_global())
+    .or_fail("start the threads that workers share (DARN_THREADS)")?;
     let mender = NetworkMender {
         scan_limits: settings.scan_limits(),
         ..network::mender(&settings.network)?

@@ -1,13 +1,13 @@
-//! A log that nobody reads, or that cannot be written: the service in another process.
+//! A log that nobody reads, or that cannot be written, and threads that cannot be started: the service in another process.
 
 use std::{
     fs::OpenOptions,
     io::{Read, Write},
     net::{SocketAddr, TcpStream},
-    process::{Child, Stdio},
+    process::{Command, Stdio},
 };
 
-use crate::signals::{TIMEOUT, ends, metrics, signal, start};
+use crate::signals::{Process, TIMEOUT, ends, metrics, service_behind, signal, start};
 
 /// The log of the first requests fills a pipe, which holds 64 KiB.
 const REQUESTS: usize = 1000;
@@ -43,17 +43,16 @@ fn dropped_lines(address: SocketAddr) -> u64 {
     values.iter().sum()
 }
 
-fn ends_cleanly(mut child: Child) {
-    signal(&child);
-    let ended = ends(&mut child, TIMEOUT);
-    child.kill().ok();
-    assert!(child.wait().unwrap().success() && ended);
+fn ends_cleanly(mut child: Process) {
+    signal(&child.0);
+    assert!(ends(&mut child.0, TIMEOUT), "it did not end");
+    assert!(child.0.wait().unwrap().success());
 }
 
 #[test]
 fn a_service_whose_log_reader_has_gone_goes_on_and_counts_the_lines() {
     let (mut child, address) = start(Stdio::piped());
-    drop(child.stderr.take());
+    drop(child.0.stderr.take());
     send_requests(address);
     assert!(dropped_lines(address) > 0);
     ends_cleanly(child);
@@ -71,7 +70,7 @@ fn a_service_whose_log_has_no_space_goes_on_and_counts_the_lines() {
 #[test]
 fn a_service_whose_log_is_not_read_goes_on_and_ends() {
     let (mut child, address) = start(Stdio::piped());
-    let unread = child.stderr.take();
+    let unread = child.0.stderr.take();
     send_requests(address);
     ends_cleanly(child);
     drop(unread);
@@ -80,7 +79,7 @@ fn a_service_whose_log_is_not_read_goes_on_and_ends() {
 #[test]
 fn the_log_is_complete_at_the_end() {
     let (mut child, address) = start(Stdio::piped());
-    let mut log = child.stderr.take().unwrap();
+    let mut log = child.0.stderr.take().unwrap();
     let reader = std::thread::spawn(move || {
         let mut text = String::new();
         log.read_to_string(&mut text).map(|_| text)
@@ -91,4 +90,23 @@ fn the_log_is_complete_at_the_end() {
     let answered = text.lines().filter(|line| line.contains("/livez")).count();
     assert_eq!(answered, REQUESTS);
     assert!(text.lines().last().unwrap().contains("stopped"), "{text}");
+}
+
+#[test]
+fn a_service_whose_threads_cannot_be_started_says_so_and_ends() {
+    // Stacks of 1 GiB in 4 GiB of addresses: some of the threads can be started, not all.
+    let mut shell = Command::new("sh");
+    shell
+        .args(["-c", "ulimit -v 4194304; exec \"$0\" \"$@\""])
+        .arg(std::env::current_exe().unwrap())
+        .env("RUST_MIN_STACK", (1_u64 << 30).to_string());
+    let (mut program, _) = service_behind(shell);
+    let mut child = program.stderr(Stdio::piped()).spawn().unwrap();
+    let ended = ends(&mut child, TIMEOUT);
+    child.kill().ok();
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(ended, "it neither serves nor ends: {said}");
+    assert!(!output.status.success(), "{said}");
+    assert!(said.contains("threads cannot be started"), "{said}");
 }

@@ -31,7 +31,7 @@ fn serves_until_signalled() {
         ];
         let settings = Settings::parse_from(settings).serve;
         let _log = start_logging("info", LogFormat::Text, LogDelivery::Queued).unwrap();
-        run(&settings, Arc::new(FakeMender::default())).unwrap();
+        run(&settings, Arc::new(FakeMender::default())).unwrap_or_else(|error| panic!("{error}"));
     }
 }
 
@@ -48,10 +48,20 @@ pub fn service_behind(mut program: Command) -> (Command, SocketAddr) {
     (program, address)
 }
 
+/// Another process; killed when dropped.
+pub struct Process(pub Child);
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        self.0.kill().ok();
+        self.0.wait().ok();
+    }
+}
+
 /// Starts a service in another process, whose log goes to `stderr`, and waits until it is ready.
-pub fn start(stderr: Stdio) -> (Child, SocketAddr) {
+pub fn start(stderr: Stdio) -> (Process, SocketAddr) {
     let (mut program, address) = service_behind(Command::new(std::env::current_exe().unwrap()));
-    let child = program.stderr(stderr).spawn().unwrap();
+    let child = Process(program.stderr(stderr).spawn().unwrap());
     let end = Instant::now() + TIMEOUT;
     while healthcheck(address, TIMEOUT).is_err() {
         assert!(Instant::now() < end, "the service never was ready");
@@ -105,14 +115,12 @@ fn a_second_signal_ends_the_service_at_once() {
         assert!(Instant::now() < end, "the work never began");
         std::thread::sleep(Duration::from_millis(10));
     }
-    signal(&child);
-    let early = ends(&mut child, Duration::from_millis(500));
+    signal(&child.0);
+    let early = ends(&mut child.0, Duration::from_millis(500));
     if !early {
-        signal(&child);
+        signal(&child.0);
     }
-    let ended = ends(&mut child, TIMEOUT);
-    child.kill().ok();
-    child.wait().unwrap();
+    let ended = ends(&mut child.0, TIMEOUT);
     assert!(!early, "one signal cut the work off");
     assert!(ended, "the second signal did not end it");
 }

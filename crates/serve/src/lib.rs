@@ -34,11 +34,14 @@ mod session_routes;
 mod session_store;
 mod shutdown;
 mod telemetry;
+mod threads;
 
 use std::{
     io,
     net::SocketAddr,
+    num::NonZero,
     sync::Arc,
+    thread,
     time::{Duration, Instant},
 };
 
@@ -70,6 +73,16 @@ pub enum ServeError {
         /// Why not.
         source: io::Error,
     },
+    /// The system does not let the service start its threads.
+    #[error(
+        "{count} threads cannot be started: {source}; raise the limit of processes (ulimit -u) or of the control group, or lower DARN_WORKERS"
+    )]
+    Threads {
+        /// How many were tried.
+        count: usize,
+        /// Why not.
+        source: io::Error,
+    },
     /// Threads, signals or sockets failed.
     #[error("the service failed: {0}")]
     Io(#[from] io::Error),
@@ -83,7 +96,14 @@ pub enum ServeError {
 /// # Errors
 /// An address that cannot be bound, a failed warm-up, or an I/O error; see [`ServeError`].
 pub fn run(settings: &ServeArgs, mender: Arc<dyn Mender>) -> Result<(), ServeError> {
-    let runtime = runtime::Builder::new_multi_thread().enable_all().build()?;
+    let async_threads = thread::available_parallelism().map_or(1, NonZero::get);
+    // One more for what blocks: the runtime starts others only if it can.
+    let count = async_threads + settings.workers() + 1;
+    threads::check(count).map_err(|source| ServeError::Threads { count, source })?;
+    let runtime = runtime::Builder::new_multi_thread()
+        .worker_threads(async_threads)
+        .enable_all()
+        .build()?;
     let outcome = runtime.block_on(async {
         let sockets = Sockets::bind(settings.listen, settings.grpc_listen).await?;
         let app = App::start(settings, mender)?;
