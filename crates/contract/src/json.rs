@@ -6,9 +6,11 @@
 
 use std::fmt;
 
+use darn_json::excerpt;
 use serde::de::{
     DeserializeOwned, DeserializeSeed, Deserializer, Error as _, Expected, IntoDeserializer,
-    MapAccess, SeqAccess, Unexpected, Visitor, value::StrDeserializer,
+    MapAccess, SeqAccess, Unexpected, Visitor,
+    value::{Error as SerdeError, StrDeserializer},
 };
 use serde_json::{Map, Value};
 
@@ -34,7 +36,7 @@ pub enum JsonError {
 /// [`JsonError::Syntax`] when the text is not JSON, [`JsonError::Shape`] with a pointer when it is not such a message.
 pub fn from_json<T: DeserializeOwned>(text: &[u8]) -> Result<T, JsonError> {
     let value = darn_json::value(text).map_err(|error| JsonError::Syntax {
-        detail: error.to_string(),
+        detail: excerpt(&error.to_string()).into_owned(),
     })?;
     T::deserialize(ValueReader::element(&value))
         .map_err(|error| JsonError::Shape(error.into_field_error()))
@@ -80,6 +82,25 @@ impl serde::de::Error for PathError {
             detail,
             steps: Vec::new(),
         }
+    }
+
+    // What serde says, with the caller's text cut.
+
+    fn unknown_field(field: &str, expected: &'static [&'static str]) -> Self {
+        Self::custom(SerdeError::unknown_field(&excerpt(field), expected))
+    }
+
+    fn unknown_variant(variant: &str, expected: &'static [&'static str]) -> Self {
+        Self::custom(SerdeError::unknown_variant(&excerpt(variant), expected))
+    }
+
+    fn invalid_value(unexpected: Unexpected<'_>, expected: &dyn Expected) -> Self {
+        Self::custom(match unexpected {
+            Unexpected::Str(text) => {
+                SerdeError::invalid_value(Unexpected::Str(&excerpt(text)), expected)
+            }
+            other => SerdeError::invalid_value(other, expected),
+        })
     }
 
     /// Names JSON types, where serde names Rust types.
@@ -280,6 +301,7 @@ impl<'de> MapAccess<'de> for ObjectReader<'_> {
 mod tests {
     use super::*;
     use crate::v1;
+    use darn_json::EXCERPT_BYTES;
 
     fn shape_error(text: &str) -> (String, String) {
         match from_json::<v1::Constraints>(text.as_bytes()) {
@@ -373,6 +395,35 @@ mod tests {
             shape_error(r#"{"holes": 7}"#).1,
             "expected an array; got the number 7"
         );
+    }
+
+    #[test]
+    fn an_error_repeats_only_the_beginning_of_a_long_text() {
+        let long = "ä~/".repeat(1 << 17);
+        let nested = format!(r#"{{"{long}": "#).repeat(100) + "[0" + &"}".repeat(100);
+        for text in [
+            format!(r#"{{"{long}": 0}}"#),
+            format!(r#"{{"holes": [{{"{long}": 0}}]}}"#),
+            format!(r#"{{"holes": "{long}"}}"#),
+            format!(r#"{{"holes": [{{"id": "{long}"}}]}}"#),
+            format!(r#"{{"anchors": [{{"uv": ["{long}"]}}]}}"#),
+            format!(r#"{{"anchors": [{{"hard": "{long}"}}]}}"#),
+            format!(r#"{{"edits": [{{"pinch": {{"uvs": [[{{"{long}": 1e999}}]]}}}}]}}"#),
+            format!(r#"{{"{long}"#),
+            format!("[{long}"),
+            nested,
+        ] {
+            let (pointer, detail) = match from_json::<v1::Constraints>(text.as_bytes()) {
+                Err(JsonError::Shape(FieldError { pointer, detail })) => (pointer, detail),
+                Err(JsonError::Syntax { detail }) => (String::new(), detail),
+                Ok(read) => panic!("{read:?}"),
+            };
+            assert!(pointer.len() <= EXCERPT_BYTES, "{pointer}");
+            assert!(detail.len() <= EXCERPT_BYTES + 150, "{detail}");
+        }
+        let (pointer, detail) = shape_error(&format!(r#"{{"{long}": 0}}"#));
+        assert!(pointer.starts_with("/ä~0~1ä") && pointer.ends_with('…'));
+        assert!(detail.contains("…`, expected one of `holes`"), "{detail}");
     }
 
     #[test]

@@ -10,6 +10,7 @@ pub mod port;
 mod validate;
 
 pub use codes::{Code, GrpcCode};
+pub use darn_json::{EXCERPT_BYTES, cut, excerpt};
 pub use error_chain::error_chain;
 pub use json::{JsonError, from_json};
 pub use validate::{Anchor, Constraints, Edit, FieldError, Gesture, HoleSelector, Search};

@@ -2,6 +2,8 @@
 //!
 //! Whether a hole exists is checked by the mender, which has the scan.
 
+use darn_json::{EXCERPT_BYTES, excerpt};
+
 use super::v1;
 
 /// Most entries of one list of constraints: far above any use, and cheap to check.
@@ -14,7 +16,7 @@ const NOT_SERVED: &str = "not served by this version yet";
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{pointer}{}{detail}", if .pointer.is_empty() { "" } else { ": " })]
 pub struct FieldError {
-    /// JSON pointer (RFC 6901) into the constraints or the query; empty for the whole.
+    /// JSON pointer (RFC 6901) into the constraints or the query; empty for the whole. One with a caller's own long keys is cut.
     pub pointer: String,
     /// What is wrong, for a person.
     pub detail: String,
@@ -24,7 +26,7 @@ impl FieldError {
     /// An error at `pointer`.
     pub fn new(pointer: impl Into<String>, detail: impl Into<String>) -> Self {
         Self {
-            pointer: pointer.into(),
+            pointer: excerpt(&pointer.into()).into_owned(),
             detail: detail.into(),
         }
     }
@@ -148,6 +150,7 @@ impl Constraints {
             [] => None,
             up => errors.direction("/up", up),
         };
+        errors.name("/weights", message.weights.as_deref());
         if errors.0.is_empty() {
             Ok(Self {
                 holes,
@@ -201,6 +204,17 @@ impl FieldErrors {
             self.push(
                 pointer,
                 format!("{count} entries; the limit is {MAX_ENTRIES}"),
+            );
+        }
+    }
+
+    /// A name is repeated in errors and reports.
+    fn name(&mut self, at: &str, name: Option<&str>) {
+        let length = name.map_or(0, str::len);
+        if length > EXCERPT_BYTES {
+            self.push(
+                at,
+                format!("a name of {length} bytes; the limit is {EXCERPT_BYTES}"),
             );
         }
     }
@@ -433,8 +447,10 @@ mod tests {
             "edits": [{}, {"grab": {"uv": [2, 0], "offset": [0, 0, 0]}}, {"twist": {"uv": [0, 0], "radius": 0, "axis": [0, 1, 0], "angle": 1}},
                       {"twist": {"uv": [0, 0], "radius": 0.1, "axis": [0, 0, 0], "angle": 1}}, {"pinch": {"uvs": [[0, 0], [0, "x"]], "amount": 1}},
                       {"pinch": {"uvs": [[0, 0]]}}, {"pinch": {"uvs": [[0, 0], [1, 1]]}}],
-            "up": [1]
+            "up": [1],
+            "weights": "NAME"
         }"#;
+        let text = text.replace("NAME", &"n".repeat(257));
         let expected = [
             "/holes/0",
             "/holes/1",
@@ -454,8 +470,9 @@ mod tests {
             "/edits/5/pinch/amount",
             "/edits/6/pinch/amount",
             "/up",
+            "/weights",
         ];
-        assert_eq!(check(text).unwrap_err(), expected);
+        assert_eq!(check(&text).unwrap_err(), expected);
     }
 
     proptest! {

@@ -1,13 +1,17 @@
-//! Parses JSON text to a [`Value`] in which every key is an ordinary key.
+//! Parses JSON text to a [`Value`] in which every key is an ordinary key, and cuts callers' texts to what errors repeat ([`excerpt`]).
 //!
 //! `gltf` turns on serde_json's feature `raw_value`. With it, serde_json's own parser treats an object that begins with a private key as a
 //! string of JSON to be parsed again, with a fresh recursion limit: nested strings of that kind overflow the stack, and escape any count
 //! of what the text contains. This parser reads that key as text.
 
+mod excerpt;
+
 use std::fmt;
 
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Number, Value};
+
+pub use excerpt::{EXCERPT_BYTES, cut, excerpt};
 
 /// The private key under which serde_json's feature `arbitrary_precision` hands out a number that is not a machine integer, as its text.
 /// An object that a caller wrote with this key is read as that number, which is harmless.

@@ -19,7 +19,7 @@ use super::{
 };
 use darn_contract::port::Mended;
 use darn_contract::{
-    Constraints, Search,
+    Constraints, Search, excerpt,
     v1::{self, AnchorFound, HolesReport, InpaintChunk, ScanChunk, inpaint_chunk::Part},
 };
 
@@ -28,7 +28,7 @@ const CHUNK_BYTES: usize = 256 << 10;
 /// Most bytes of an incoming message. Decoded, its nested messages take up to 36 times as much memory: about the default body limit.
 const MAX_MESSAGE_BYTES: usize = 4 << 20;
 
-/// The service, ready to be routed.
+/// The service, ready to be routed. tonic encodes each answer on an async thread; protobuf takes a fraction of JSON's time for it.
 pub fn service(app: &Arc<App>) -> DarnServer<GrpcService> {
     DarnServer::new(GrpcService(Arc::clone(app)))
         .max_decoding_message_size(MAX_MESSAGE_BYTES)
@@ -190,7 +190,10 @@ fn stream_error(status: &Status) -> RequestError {
         Code::OutOfRange => RequestError::MessageTooLarge {
             limit: MAX_MESSAGE_BYTES,
         },
-        _ => RequestError::Malformed(format!("the stream broke off: {}", status.message())),
+        _ => RequestError::Malformed(format!(
+            "the stream broke off: {}",
+            excerpt(status.message())
+        )),
     }
 }
 

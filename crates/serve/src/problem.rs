@@ -9,6 +9,10 @@ use serde::Serialize;
 use tonic::metadata::MetadataValue;
 
 use super::{error::RequestError, media_types::PROBLEM_JSON};
+use darn_contract::cut;
+
+/// Most bytes of one text of an error, whatever the mender says in it.
+const TEXT_BYTES: usize = 2 << 10;
 
 /// Most bytes of a gRPC status' message; percent-encoding may triple them.
 const GRPC_MESSAGE_BYTES: usize = 600;
@@ -31,12 +35,12 @@ impl RequestError {
             title: self.status().canonical_reason().unwrap_or("Error"),
             status: code.status,
             code: code.word,
-            detail: self.to_string(),
+            detail: short(&self.to_string()),
             request_id: request_id.to_owned(),
             errors: (self.fields().iter())
                 .map(|field| ProblemField {
-                    pointer: field.pointer.clone(),
-                    detail: field.detail.clone(),
+                    pointer: short(&field.pointer),
+                    detail: short(&field.detail),
                 })
                 .collect(),
         }
@@ -70,7 +74,7 @@ impl RequestError {
         let code = self.code();
         let mut status = tonic::Status::new(
             tonic::Code::from_i32(code.grpc as i32),
-            cut(self.to_string(), GRPC_MESSAGE_BYTES),
+            cut(&self.to_string(), GRPC_MESSAGE_BYTES),
         );
         let document = self.document(request_id).json_within(GRPC_DOCUMENT_BYTES);
         let metadata = status.metadata_mut();
@@ -114,12 +118,12 @@ impl Problem {
         if whole.len() <= limit {
             return whole;
         }
-        self.detail = cut(self.detail, limit / 4);
+        self.detail = cut(&self.detail, limit / 4).into_owned();
         let errors = std::mem::take(&mut self.errors);
         let all = errors.len();
         for error in errors {
-            let detail = cut(error.detail, limit / 4);
-            let pointer = cut(error.pointer, limit / 4);
+            let detail = cut(&error.detail, limit / 4).into_owned();
+            let pointer = cut(&error.pointer, limit / 4).into_owned();
             self.errors.push(ProblemField { pointer, detail });
             if self.json().len() > limit - OMITTED_NOTE {
                 self.errors.pop();
@@ -146,12 +150,6 @@ struct ProblemField {
     detail: String,
 }
 
-/// A text cut to at most `limit` bytes, the last of them an ellipsis if anything was cut off.
-fn cut(mut text: String, limit: usize) -> String {
-    const ELLIPSIS: &str = "…";
-    if text.len() > limit {
-        text.truncate(text.floor_char_boundary(limit.saturating_sub(ELLIPSIS.len())));
-        text.push_str(ELLIPSIS);
-    }
-    text
+fn short(text: &str) -> String {
+    cut(text, TEXT_BYTES).into_owned()
 }
