@@ -1,16 +1,27 @@
 //! The OpenAPI 3.1 document. Paths are written here; the schemas come from the contract's descriptor, so they match its types.
 //! `proto/openapi.json` is a copy of this document; a test fails when the two differ.
 
+use std::sync::LazyLock;
+
+use bytes::Bytes;
 use serde_json::{Map, Value, json};
 
 use super::{
     media_types::{FORM_DATA, GLB, GLTF, JSON, MULTIPART_MIXED, PROBLEM_JSON, TEXT},
-    schema,
+    response, schema,
 };
 
 mod sessions;
 
-/// The document, as served at `/openapi.json`.
+/// The document's text, as served at `/openapi.json`.
+static WRITTEN: LazyLock<Bytes> = LazyLock::new(|| Bytes::from(response::json(&document())));
+
+/// The document's text, written once for the whole process.
+pub(super) fn text() -> Bytes {
+    WRITTEN.clone()
+}
+
+/// The document.
 pub fn document() -> Value {
     let mut schemas = schema::schemas();
     schemas.insert("Problem".to_owned(), problem_schema());

@@ -1,4 +1,6 @@
 //! Successful answers: what was mended, alone or with its report in multipart/mixed, and JSON.
+//!
+//! Answers grow with the scan, so they are written by the job that computes them, on a worker; an async thread only sends their bytes.
 
 use axum::{
     body::Body,
@@ -8,7 +10,10 @@ use axum::{
 use serde::Serialize;
 use uuid::Uuid;
 
-use super::media_types::{GLB, JSON, MULTIPART_MIXED, OCTET_STREAM};
+use super::{
+    media_types::{GLB, JSON, MULTIPART_MIXED, OCTET_STREAM},
+    telemetry::Metrics,
+};
 use darn_contract::port::{Mended, PatchForm, Patches};
 use darn_contract::v1;
 
@@ -22,7 +27,7 @@ pub const ANCHOR_DISTANCE: HeaderName = HeaderName::from_static("darn-anchor-dis
 /// Keeps caches from storing an answer whose content changes.
 const NO_STORE: (HeaderName, &str) = (header::CACHE_CONTROL, "no-store");
 
-/// A message as JSON. Messages of the contract have text keys only, so writing one does not fail.
+/// A message as JSON; to be called on a worker. Messages of the contract have text keys only, so writing one does not fail.
 pub fn json(message: &impl Serialize) -> Vec<u8> {
     serde_json::to_vec(message).unwrap_or_default()
 }
@@ -68,8 +73,10 @@ impl MendResponse {
         }
     }
 
-    /// The answer in the media type that the caller prefers: with its report when that is multipart/mixed, else alone.
-    pub fn render(self, preferred: &str) -> Response {
+    /// Counts the mend and writes its answer in the media type that the caller prefers: with its report when that is multipart/mixed,
+    /// else alone; to be called on a worker.
+    pub fn render(self, preferred: &str, metrics: &Metrics) -> Response {
+        metrics.mended(&self.report);
         let headers = report_headers(&self.report);
         let (media_type, body) = if preferred == MULTIPART_MIXED {
             self.multipart()

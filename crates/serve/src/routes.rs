@@ -3,7 +3,7 @@
 use std::{sync::Arc, time::Instant};
 
 use axum::{
-    Json, Router,
+    Router,
     extract::{MatchedPath, Request, State},
     http::{HeaderValue, Method, header},
     middleware::{self, Next},
@@ -40,7 +40,7 @@ pub fn routes() -> Router<Arc<App>> {
         .route("/livez", get(|| async { "alive\n" }))
         .route("/readyz", get(readyz))
         .route("/metrics", get(metrics))
-        .route("/openapi.json", get(|| async { Json(openapi::document()) }))
+        .route("/openapi.json", get(openapi_document))
         .fallback(|| async { RequestError::NotFound })
         .method_not_allowed_fallback(|| async { RequestError::MethodNotAllowed })
 }
@@ -128,22 +128,23 @@ async fn inpaint(State(app): State<Arc<App>>, request: Request) -> Result<Respon
         upload,
     } = body::receive_scan::<Constraints>(&app, request).await?;
     let constraints = parameters.unwrap_or_default();
-    let mended = app
-        .submit(upload, move |mender, cancellation| {
-            mender.inpaint(scan, &constraints, cancellation)
-        })
-        .await?;
-    app.metrics.mended(&mended.report);
-    Ok(MendResponse::from(mended).render(media_type))
+    let service = Arc::clone(&app);
+    app.submit(upload, move |mender, cancellation| {
+        let mended = mender.inpaint(scan, &constraints, cancellation)?;
+        Ok(MendResponse::from(mended).render(media_type, &service.metrics))
+    })
+    .await
 }
 
 async fn holes(State(app): State<Arc<App>>, request: Request) -> Result<Response, RequestError> {
     let received = body::receive_scan(&app, request).await?;
     let ScanRequest { scan, upload, .. } = received.without_constraints()?;
-    let report = app
-        .submit(upload, move |mender, _| mender.find_holes(scan))
+    let text = app
+        .submit(upload, move |mender, _| {
+            Ok(response::json(&mender.find_holes(scan)?))
+        })
         .await?;
-    Ok(Json(report).into_response())
+    Ok(response::json_response(text))
 }
 
 async fn optimize_anchor(
@@ -167,13 +168,16 @@ async fn optimize_anchor(
             .await?;
         return Ok(response::json_response(text));
     }
-    let mended = app
-        .submit(upload, move |mender, cancellation| {
-            mender.mend_to_target(scan, &search, cancellation)
-        })
-        .await?;
-    app.metrics.mended(&mended.report);
-    Ok(MendResponse::from(mended).render(media_type))
+    let service = Arc::clone(&app);
+    app.submit(upload, move |mender, cancellation| {
+        let mended = mender.mend_to_target(scan, &search, cancellation)?;
+        Ok(MendResponse::from(mended).render(media_type, &service.metrics))
+    })
+    .await
+}
+
+async fn openapi_document() -> impl IntoResponse {
+    ([(header::CONTENT_TYPE, JSON)], openapi::text())
 }
 
 async fn readyz(State(app): State<Arc<App>>) -> Result<&'static str, RequestError> {

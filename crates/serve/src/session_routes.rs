@@ -102,13 +102,12 @@ async fn inpaint(
     };
     let SessionRequest { parameters, upload } = receive::<Constraints>(&app, id, request).await?;
     let constraints = parameters::only_edits(parameters.unwrap_or_default())?;
-    let patches = app
-        .submit_to_session(id, upload, move |session, cancellation| {
-            session.patches(&constraints, form, cancellation)
-        })
-        .await?;
-    app.metrics.mended(&patches.report);
-    Ok(MendResponse::of_patches(patches, form).render(media_type))
+    let service = Arc::clone(&app);
+    app.submit_to_session(id, upload, move |session, cancellation| {
+        let patches = session.patches(&constraints, form, cancellation)?;
+        Ok(MendResponse::of_patches(patches, form).render(media_type, &service.metrics))
+    })
+    .await
 }
 
 async fn optimize_anchor(
@@ -136,13 +135,12 @@ async fn result(
 ) -> Result<Response, RequestError> {
     let media_type = preferred(request.headers(), &[GLB, GLTF, MULTIPART_MIXED]);
     let upload = session_permit(&app, id)?;
-    let mended = app
-        .submit_to_session(id, upload, |session, cancellation| {
-            session.result(cancellation)
-        })
-        .await?;
-    app.metrics.mended(&mended.report);
-    Ok(MendResponse::from(mended).render(media_type))
+    let service = Arc::clone(&app);
+    app.submit_to_session(id, upload, move |session, cancellation| {
+        let mended = session.result(cancellation)?;
+        Ok(MendResponse::from(mended).render(media_type, &service.metrics))
+    })
+    .await
 }
 
 async fn delete(
