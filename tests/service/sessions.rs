@@ -377,6 +377,7 @@ async fn a_shutdown_refuses_requests_to_sessions() {
         let request = Request::builder()
             .method(method)
             .uri(path)
+            .header("host", "x")
             .body(Body::empty());
         let answer = router(&app).oneshot(request.unwrap()).await.unwrap();
         assert_eq!(answer.status(), 503);

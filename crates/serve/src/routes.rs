@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Instant};
 use axum::{
     Router,
     extract::{MatchedPath, Request, State},
-    http::{HeaderValue, Method, header},
+    http::{HeaderValue, Method, Version, header, uri::Authority},
     middleware::{self, Next},
     response::{IntoResponse, Response},
     routing::{get, post},
@@ -28,7 +28,7 @@ use super::{
     session_routes,
     telemetry::{REQUEST_ID, RequestId},
 };
-use darn_contract::{Constraints, Search};
+use darn_contract::{Constraints, Search, excerpt};
 
 /// All HTTP routes; [`finish`] makes them a service.
 pub fn routes() -> Router<Arc<App>> {
@@ -45,14 +45,16 @@ pub fn routes() -> Router<Arc<App>> {
         .method_not_allowed_fallback(|| async { RequestError::MethodNotAllowed })
 }
 
-/// Adds the layers around all routes of a listener: panics, request ids, problem documents, metrics, CORS.
+/// Adds the layers around all routes of a listener: panics, CORS, the check of the host, and outermost what every answer gets: request
+/// ids, problem documents, metrics, the log.
 pub fn finish(routes: Router<Arc<App>>, app: &Arc<App>) -> Router {
     routes
         .layer(CatchPanicLayer::custom(|_| {
             RequestError::Internal.into_response()
         }))
-        .layer(middleware::from_fn_with_state(Arc::clone(app), observe))
         .layer(cors(&app.allow_origin))
+        .layer(middleware::from_fn_with_state(Arc::clone(app), check_host))
+        .layer(middleware::from_fn_with_state(Arc::clone(app), observe))
         .with_state(Arc::clone(app))
 }
 
@@ -85,6 +87,25 @@ fn cors(origins: &[String]) -> CorsLayer {
         ])
 }
 
+/// Refuses a request whose target is in doubt (RFC 9112, section 3.2): with more than one header `host`, an invalid one, or, in HTTP/1.1,
+/// none. A proxy in front of the service might have read another one.
+async fn check_host(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
+    let mut hosts = request.headers().get_all(header::HOST).iter();
+    let problem = match (hosts.next(), hosts.next()) {
+        (None, _) if request.version() == Version::HTTP_11 => "HTTP/1.1 needs the header `host`",
+        (Some(_), Some(_)) => "the header `host` comes twice",
+        (Some(host), None) if !is_host(host.as_bytes()) => "the header `host` names no host",
+        _ => return next.run(request).await,
+    };
+    body::discard(request, &app.limits);
+    RequestError::Malformed(problem.to_owned()).into_response()
+}
+
+/// Whether it is `host` or `host:port`; it is empty when the target has no host.
+fn is_host(value: &[u8]) -> bool {
+    value.is_empty() || (!value.contains(&b'@') && Authority::try_from(value).is_ok())
+}
+
 /// Gives a request its id and log span, renders its error, and records its metrics.
 async fn observe(State(app): State<Arc<App>>, mut request: Request, next: Next) -> Response {
     let started = Instant::now();
@@ -94,7 +115,8 @@ async fn observe(State(app): State<Arc<App>>, mut request: Request, next: Next) 
         .get::<MatchedPath>()
         .map_or("(none)", MatchedPath::as_str)
         .to_owned();
-    let span = info_span!("request", id = id.0, method = %request.method(), route);
+    let method = excerpt(request.method().as_str());
+    let span = info_span!("request", id = id.0, %method, route);
     request.extensions_mut().insert(id.clone());
 
     let mut response = next.run(request).instrument(span.clone()).await;
