@@ -11,7 +11,8 @@ use std::{
     time::Duration,
 };
 
-use axum::Router;
+use axum::{Router, http::Request};
+use hyper::body::Incoming;
 use hyper_util::{
     rt::{TokioExecutor, TokioIo, TokioTimer},
     server::{conn::auto, graceful::GracefulShutdown},
@@ -23,7 +24,10 @@ use tokio::{
     time::{self, Instant, Sleep},
 };
 use tokio_util::sync::CancellationToken;
+use tower::ServiceExt as _;
 use tracing::{debug, error};
+
+use super::client_address::ClientAddress;
 
 /// Bytes after which hyper knows the HTTP version and its own timers apply.
 const PREFACE_BYTES: usize = 24;
@@ -41,9 +45,14 @@ pub async fn serve(socket: TcpListener, router: Router, stop: CancellationToken,
         .keep_alive_interval(pause)
         .keep_alive_timeout(pause);
     let connections = GracefulShutdown::new();
-    while let Some(stream) = stop.run_until_cancelled(accept(&socket)).await {
+    while let Some((stream, client)) = stop.run_until_cancelled(accept(&socket)).await {
         let io = TokioIo::new(TimeoutStream::new(stream, pause));
-        let service = TowerToHyperService::new(router.clone());
+        let router = router.clone();
+        let service =
+            TowerToHyperService::new(router.map_request(move |mut request: Request<Incoming>| {
+                request.extensions_mut().insert(client);
+                request
+            }));
         let connection = http.serve_connection(io, service).into_owned();
         let connection = connections.watch(connection);
         tokio::spawn(async move {
@@ -57,13 +66,13 @@ pub async fn serve(socket: TcpListener, router: Router, stop: CancellationToken,
 }
 
 /// Waits for the next connection; retries after errors.
-async fn accept(socket: &TcpListener) -> TcpStream {
+async fn accept(socket: &TcpListener) -> (TcpStream, ClientAddress) {
     loop {
         let error = match socket.accept().await {
-            Ok((stream, _)) => {
+            Ok((stream, peer)) => {
                 // A failure costs latency only.
                 stream.set_nodelay(true).ok();
-                return stream;
+                return (stream, ClientAddress::of(peer.ip()));
             }
             Err(error) => error,
         };

@@ -8,6 +8,7 @@
 mod accept;
 mod app;
 mod body;
+mod client_address;
 mod config;
 mod connections;
 mod ended_sessions;
