@@ -10,7 +10,10 @@ use clap::Parser;
 use darn_serve::{App, ServeArgs, ServeError, Sockets, serve};
 use reqwest::{Body, Method, RequestBuilder, Response, StatusCode};
 use serde_json::Value;
-use tokio::task::JoinHandle;
+use tokio::{
+    net::{TcpSocket, TcpStream},
+    task::JoinHandle,
+};
 use tokio_util::sync::CancellationToken;
 
 use crate::fake::{FakeMender, FakeScan};
@@ -131,6 +134,15 @@ impl Service {
             .find_map(|l| l.strip_prefix(line)?.strip_prefix(' '))?;
         found.parse().ok()
     }
+}
+
+/// A connection to the service from another address of this machine, such as 127.0.0.2.
+pub async fn connect_from(service: &Service, address: &str) -> TcpStream {
+    let socket = TcpSocket::new_v4().unwrap();
+    socket
+        .bind(format!("{address}:0").parse().unwrap())
+        .unwrap();
+    socket.connect(service.address).await.unwrap()
 }
 
 /// Waits until a condition holds.

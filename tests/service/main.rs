@@ -8,6 +8,7 @@ mod harness;
 mod load;
 mod logs;
 mod openapi;
+mod peers;
 mod protocols;
 mod sessions;
 mod signals;

@@ -10,16 +10,23 @@ use tokio::{
     time::timeout,
 };
 
-use crate::harness::{Service, Settings, problem};
+use crate::harness::{Service, Settings, connect_from, problem};
 
 const TIMEOUT: Duration = Duration::from_secs(10);
 
+/// More than a small body.
+const LARGE: usize = 2 << 20;
+
 /// A request that declares a body of `body` bytes and sends three of them.
-async fn stalled(service: &Service, body: u64) -> TcpStream {
+async fn stalled(service: &Service, body: usize) -> TcpStream {
+    stall(TcpStream::connect(service.address).await.unwrap(), body).await
+}
+
+/// The same on a connection.
+async fn stall(mut stream: TcpStream, body: usize) -> TcpStream {
     let head = format!(
         "POST /inpaint HTTP/1.1\r\nhost: x\r\ncontent-type: model/gltf-binary\r\ncontent-length: {body}\r\n\r\nclo"
     );
-    let mut stream = TcpStream::connect(service.address).await.unwrap();
     stream.write_all(head.as_bytes()).await.unwrap();
     stream
 }
@@ -104,7 +111,7 @@ async fn a_body_declared_too_large_is_refused_at_once() {
 async fn stalled_uploads_take_no_place_in_the_queue() {
     let service = Service::start(&["--workers", "1", "--queue", "1"]).await;
     let mut streams = Vec::new();
-    for _ in 0..6 {
+    for _ in 0..3 {
         streams.push(stalled(&service, 9).await);
     }
     // A test cannot observe that the service has begun to read them.
@@ -116,27 +123,126 @@ async fn stalled_uploads_take_no_place_in_the_queue() {
 
 #[tokio::test]
 async fn uploads_are_bounded_and_the_refusal_names_the_setting() {
-    let service = Service::start(&["--uploads", "2"]).await;
-    let streams = [stalled(&service, 9).await, stalled(&service, 9).await];
-    let end = Instant::now() + TIMEOUT;
-    let refused = loop {
-        let answer = service.scan("cloth").send().await.unwrap();
-        if answer.status() != 200 {
-            break answer;
-        }
-        assert!(Instant::now() < end, "nothing was refused");
-    };
-    assert!(refused.headers().contains_key("retry-after"));
-    insta::assert_snapshot!("uploads_full", format!("{:#}", problem(refused).await));
-    assert_eq!(service.get("/readyz").send().await.unwrap().status(), 200);
+    let shared = ["--uploads", "3"];
+    let anybody = ["--uploads", "2", "--connections-per-address", "0"];
+    for (settings, size, name) in [
+        (&anybody[..], LARGE, "uploads_full"),
+        (&anybody[..], 9, "uploads_full"),
+        (&shared[..], LARGE, "upload_share_full"),
+        (&shared[..], 9, "upload_share_full"),
+    ] {
+        let service = Service::start(settings).await;
+        let streams = [stalled(&service, size).await, stalled(&service, size).await];
+        let send = async || {
+            let request = service.scan("cloth").body(vec![7; size]);
+            request.send().await.unwrap()
+        };
+        let end = Instant::now() + TIMEOUT;
+        let refused = loop {
+            let answer = send().await;
+            if answer.status() != 200 {
+                break answer;
+            }
+            assert!(Instant::now() < end, "nothing was refused");
+        };
+        assert!(refused.headers().contains_key("retry-after"));
+        insta::assert_snapshot!(name, format!("{:#}", problem(refused).await));
+        assert_eq!(service.get("/readyz").send().await.unwrap().status(), 200);
 
-    drop(streams);
-    while service.scan("cloth").send().await.unwrap().status() != 200 {
-        assert!(
-            Instant::now() < end,
-            "closed connections keep their upload permits"
-        );
+        drop(streams);
+        while send().await.status() != 200 {
+            assert!(
+                Instant::now() < end,
+                "closed connections keep their upload permits"
+            );
+        }
     }
+}
+
+#[tokio::test]
+async fn one_address_leaves_half_of_the_uploads_to_others() {
+    let service = Service::start(&["--uploads", "4"]).await;
+    let mut streams = Vec::new();
+    for _ in 0..6 {
+        streams.push(stalled(&service, LARGE).await);
+    }
+    for refused in &mut streams[2..] {
+        assert_eq!(status(refused).await, "HTTP/1.1 503");
+    }
+    let mut other = stall(connect_from(&service, "127.0.0.2").await, LARGE).await;
+    other.write_all(&vec![7; LARGE - 3]).await.unwrap();
+    assert_eq!(status(&mut other).await, "HTTP/1.1 200");
+}
+
+#[tokio::test]
+async fn sessions_are_served_while_large_uploads_stall() {
+    let service = Service::start(&["--uploads", "1"]).await;
+    let session = service.session("cloth").await;
+    let _stalled = stalled(&service, LARGE).await;
+    let mut refused = stalled(&service, LARGE).await;
+    assert_eq!(status(&mut refused).await, "HTTP/1.1 503");
+
+    let edit = service.ask(&format!("{session}/inpaint"), "{}");
+    assert_eq!(edit.send().await.unwrap().status(), 200);
+    // Also one whose length is not declared.
+    let mut edit = TcpStream::connect(service.address).await.unwrap();
+    let head = format!(
+        "POST {session}/inpaint HTTP/1.1\r\nhost: x\r\ncontent-type: application/json\r\ntransfer-encoding: chunked\r\n\r\n"
+    );
+    edit.write_all(head.as_bytes()).await.unwrap();
+    edit.write_all(b"2\r\n{}\r\n0\r\n\r\n").await.unwrap();
+    assert_eq!(status(&mut edit).await, "HTTP/1.1 200");
+    for path in [session.clone(), format!("{session}/result")] {
+        assert_eq!(service.get(&path).send().await.unwrap().status(), 200);
+    }
+    assert_eq!(service.scan("cloth").send().await.unwrap().status(), 200);
+    assert_eq!(service.delete(&session).send().await.unwrap().status(), 204);
+}
+
+#[tokio::test]
+async fn a_session_is_read_while_small_uploads_stall() {
+    let service = Service::start(&["--uploads", "1"]).await;
+    let session = service.session("cloth").await;
+    let _stalled = stalled(&service, 9).await;
+    let mut refused = stalled(&service, 9).await;
+    assert_eq!(status(&mut refused).await, "HTTP/1.1 503");
+    for path in [session.clone(), format!("{session}/result")] {
+        assert_eq!(service.get(&path).send().await.unwrap().status(), 200);
+    }
+    assert_eq!(service.delete(&session).send().await.unwrap().status(), 204);
+}
+
+/// Sends a body of so many pieces of so many bytes, one each 20 ms, until it is answered; the answer as far as it is read at once.
+async fn trickled(service: &Service, pieces: usize, bytes: usize) -> String {
+    let mut stream = stalled(service, 3 + pieces * bytes).await;
+    for _ in 0..pieces {
+        tokio::time::sleep(Duration::from_millis(20)).await;
+        if stream.write_all(&vec![7; bytes]).await.is_err() {
+            break;
+        }
+    }
+    let mut answer = vec![0; 4096];
+    let read = timeout(TIMEOUT, stream.read(&mut answer)).await;
+    let read = read.expect("no answer").unwrap();
+    String::from_utf8_lossy(&answer[..read]).into_owned()
+}
+
+#[tokio::test]
+async fn a_body_must_keep_to_the_rate() {
+    let settings = ["--body-timeout", "400ms", "--body-rate", "1000"];
+    let service = Service::start(&settings).await;
+    // 50 bytes a second, then at most 5000: both longer than the pause.
+    let slow = trickled(&service, 50, 1).await;
+    assert!(slow.starts_with("HTTP/1.1 408"), "{slow}");
+    assert!(slow.contains("body_timeout"), "{slow}");
+    assert!(slow.contains("1000 bytes a second"), "{slow}");
+    let steady = trickled(&service, 50, 100).await;
+    assert!(steady.starts_with("HTTP/1.1 200"), "{steady}");
+
+    let settings = ["--body-timeout", "400ms", "--body-rate", "0"];
+    let service = Service::start(&settings).await;
+    let slow = trickled(&service, 50, 1).await;
+    assert!(slow.starts_with("HTTP/1.1 200"), "{slow}");
 }
 
 #[tokio::test]
@@ -160,6 +266,9 @@ fn settings_out_of_bounds_are_refused_by_name() {
         ("--workers", "100000000", "from 1 to 1024"),
         ("--queue", "18446744073709551615", "from 0 to 65536"),
         ("--uploads", "0", "from 1 to 65536"),
+        ("--connections", "0", "from 1 to 1048576"),
+        ("--connections-per-address", "many", "from 0 to 1048576"),
+        ("--body-rate", "1KB", "KiB"),
         ("--allow-origin", "example.org", "scheme://host"),
         (
             "--allow-origin",

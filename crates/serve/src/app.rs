@@ -9,21 +9,23 @@ use std::{
     time::Duration,
 };
 
-use tokio::{
-    sync::{OwnedSemaphorePermit, Semaphore},
-    time::{Instant, timeout_at},
-};
+use axum::extract::Request;
+use tokio::time::{Instant, timeout_at};
 use tracing::error;
 use uuid::Uuid;
 
 use super::{
+    client_address::ClientAddress,
     config::ServeArgs,
+    connection_table::{ConnectionLimits, ConnectionTable},
     error::RequestError,
     job::PoolError,
     kept_session::KeptSession,
+    pace::PaceLimits,
     pool::Pool,
     session_store::{SessionLimits, SessionStore},
     telemetry::Metrics,
+    uploads::{BodySize, Sharing, UploadRefusal, UploadSlot, Uploads},
 };
 use darn_contract::port::{Cancellation, Mender, Refusal};
 
@@ -35,11 +37,13 @@ pub struct App {
     pub limits: RequestLimits,
     /// Origins of web pages that may call; `*` for any.
     pub allow_origin: Vec<String>,
+    /// The open connections.
+    pub connections: Arc<ConnectionTable>,
     /// Scans kept for editing.
     pub sessions: Arc<SessionStore>,
     pool: Pool,
-    /// One permit per body that may be received at once.
-    uploads: Arc<Semaphore>,
+    /// The bodies being received.
+    uploads: Uploads,
     mender: Arc<dyn Mender>,
     warm: AtomicBool,
     draining: AtomicBool,
@@ -50,7 +54,7 @@ pub struct App {
 /// It is not a place in the queue: a body that comes slowly takes no place. Memory holds at most one body per upload permit, waiting job
 /// and running job, each within the body limit; a multipart body counts twice while it is split.
 #[derive(Debug)]
-pub struct UploadPermit(#[allow(dead_code, reason = "held for its drop")] OwnedSemaphorePermit);
+pub struct UploadPermit(#[allow(dead_code, reason = "held for its drop")] UploadSlot);
 
 /// When a request's result comes too late.
 #[derive(Debug, Clone, Copy)]
@@ -76,8 +80,18 @@ pub struct RequestLimits {
     pub body: usize,
     /// Longest time between two pieces of a body.
     pub body_pause: Duration,
-    /// Most bodies received at once.
-    pub uploads: usize,
+    /// Fewest bytes per second of a body; 0 for no such limit.
+    pub body_rate: usize,
+}
+
+impl RequestLimits {
+    /// How slowly a body may move.
+    pub fn pace(&self) -> PaceLimits {
+        PaceLimits {
+            pause: self.body_pause,
+            rate: self.body_rate,
+        }
+    }
 }
 
 impl std::fmt::Debug for App {
@@ -102,18 +116,29 @@ impl App {
             memory: settings.session_memory,
         };
         let sessions = SessionStore::new(session_limits, metrics.sessions());
+        let limits = RequestLimits {
+            deadline: settings.deadline,
+            body: settings.body_limit,
+            body_pause: settings.body_timeout,
+            body_rate: settings.body_rate,
+        };
+        let connections = ConnectionTable::new(ConnectionLimits {
+            in_all: settings.connections(),
+            per_address: settings.connections_per_address,
+            pace: limits.pace(),
+        });
+        let sharing = match settings.connections_per_address {
+            0 => Sharing::Anybody,
+            _ => Sharing::ByAddress,
+        };
         Ok(Arc::new(Self {
             metrics,
-            limits: RequestLimits {
-                deadline: settings.deadline,
-                body: settings.body_limit,
-                body_pause: settings.body_timeout,
-                uploads: settings.uploads(),
-            },
+            limits,
+            connections,
             allow_origin: settings.allow_origin.clone(),
             sessions,
             pool,
-            uploads: Arc::new(Semaphore::new(settings.uploads())),
+            uploads: Uploads::new(settings.uploads(), sharing),
             mender,
             warm: AtomicBool::new(false),
             draining: AtomicBool::new(false),
@@ -132,20 +157,41 @@ impl App {
         Ok(())
     }
 
-    /// Takes an upload permit before a body is read, and only while the queue has room.
+    /// Takes an upload permit for a large body of a client whose address is not known.
     ///
     /// # Errors
     /// `UploadsFull`, `QueueFull` or `Draining`.
     pub fn upload_permit(&self) -> Result<UploadPermit, RequestError> {
-        let permit = Arc::clone(&self.uploads).try_acquire_owned();
+        self.take_upload(BodySize::Large, None)
+    }
+
+    /// Takes an upload permit before a request's body is read, of which at most `limit` bytes count.
+    ///
+    /// # Errors
+    /// `UploadsFull`, `UploadShareFull`, `QueueFull` or `Draining`.
+    pub fn upload_permit_of(
+        &self,
+        request: &Request,
+        limit: usize,
+    ) -> Result<UploadPermit, RequestError> {
+        let client = request.extensions().get::<ClientAddress>().copied();
+        self.take_upload(BodySize::of(request.body(), limit), client)
+    }
+
+    /// Takes an upload permit, only while the queue has room.
+    fn take_upload(
+        &self,
+        size: BodySize,
+        client: Option<ClientAddress>,
+    ) -> Result<UploadPermit, RequestError> {
+        let permit = self.uploads.take(size, client);
         // Checked after the permit was taken: a drain waits for the permits taken before it.
         self.check_serving()?;
-        let upload = permit
-            .map(UploadPermit)
-            .map_err(|_| RequestError::UploadsFull {
-                limit: self.limits.uploads,
-                retry_after: self.limits.body_pause.as_secs().clamp(1, 60),
-            })?;
+        let retry_after = self.limits.body_pause.as_secs().clamp(1, 60);
+        let upload = permit.map(UploadPermit).map_err(|refusal| match refusal {
+            UploadRefusal::Full(limit) => RequestError::UploadsFull { limit, retry_after },
+            UploadRefusal::ShareFull(limit) => RequestError::UploadShareFull { limit, retry_after },
+        })?;
         (self.pool.check_capacity()).map_err(|error| of_pool(error, self.limits.deadline))?;
         Ok(upload)
     }
@@ -243,9 +289,7 @@ impl App {
     /// Refuses new requests, waits for the bodies being received, then closes the queue; its jobs still run.
     pub async fn drain(&self) {
         self.draining.store(true, Relaxed);
-        let all = u32::try_from(self.limits.uploads).unwrap_or(u32::MAX);
-        // The semaphore is never closed, so this is never an error.
-        self.uploads.acquire_many(all).await.ok();
+        self.uploads.drained().await;
         self.pool.close();
     }
 

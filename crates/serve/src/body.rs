@@ -1,6 +1,6 @@
 //! Reads a request's body within its limits, and finds in it the scan and the parameters: constraints or a query.
 
-use std::{future::poll_fn, pin::Pin};
+use std::{error::Error, future::poll_fn, pin::Pin};
 
 use axum::{
     body::{Body, HttpBody},
@@ -14,6 +14,7 @@ use super::{
     app::{App, RequestLimits, UploadPermit},
     error::RequestError,
     media_types::{FORM_DATA, GLB, GLTF, JSON, OCTET_STREAM},
+    pace::{PaceLimits, TooSlow},
     parameters::{self, Parameters},
 };
 use darn_contract::{Constraints, FieldError};
@@ -22,8 +23,6 @@ use darn_contract::{Constraints, FieldError};
 const DRAIN_FACTOR: u64 = 4;
 /// Longest time for which an unwanted body is read and dropped.
 const DRAIN_TIME: Duration = Duration::from_secs(2);
-/// The time for a whole body, as a multiple of the longest pause.
-const PAUSES_PER_BODY: u32 = 8;
 /// The media types of a body with a scan, for an error's text.
 const SCAN_BODY_MEDIA_TYPES: &str = "model/gltf-binary, model/gltf+json or multipart/form-data";
 /// The media types of the part `scan`, for an error's text.
@@ -59,8 +58,7 @@ impl ScanRequest<Constraints> {
 /// Limits the time in which a body comes.
 #[derive(Debug)]
 pub struct BodyTimer {
-    /// Longest time between two pieces.
-    pause: Duration,
+    limits: PaceLimits,
     /// When the whole body must have come.
     end: Instant,
 }
@@ -68,11 +66,9 @@ pub struct BodyTimer {
 impl BodyTimer {
     /// Starts now.
     pub fn new(limits: &RequestLimits) -> Self {
-        let end = Instant::now() + limits.body_pause * PAUSES_PER_BODY;
-        Self {
-            pause: limits.body_pause,
-            end,
-        }
+        let limits = limits.pace();
+        let end = Instant::now() + limits.whole();
+        Self { limits, end }
     }
 
     /// Waits for the next piece of a body.
@@ -80,11 +76,28 @@ impl BodyTimer {
     /// # Errors
     /// `BodyTimeout` when this piece or the whole body takes too long.
     pub async fn next<T>(&self, piece: impl Future<Output = T>) -> Result<T, RequestError> {
-        let until = self.end.min(Instant::now() + self.pause);
-        (timeout_at(until, piece).await).map_err(|_| RequestError::BodyTimeout {
-            seconds: self.pause.as_secs_f64(),
-            whole: (self.pause * PAUSES_PER_BODY).as_secs_f64(),
-        })
+        let until = self.end.min(Instant::now() + self.limits.pause);
+        (timeout_at(until, piece).await).map_err(|_| self.error())
+    }
+
+    fn error(&self) -> RequestError {
+        RequestError::BodyTimeout {
+            seconds: self.limits.pause.as_secs_f64(),
+            whole: self.limits.whole().as_secs_f64(),
+            rate: self.limits.rate,
+        }
+    }
+
+    /// The error of a body that broke off: its connection notices first when it comes below the rate.
+    fn broken_off(&self, error: &axum::Error) -> RequestError {
+        let mut cause: Option<&(dyn Error + 'static)> = Some(error);
+        while let Some(error) = cause {
+            if error.is::<TooSlow>() {
+                return self.error();
+            }
+            cause = error.source();
+        }
+        RequestError::Malformed(format!("the body broke off: {error}"))
     }
 }
 
@@ -100,13 +113,13 @@ enum ScanBody {
 /// Receives a request with a scan, unless the service is full or shuts down.
 ///
 /// # Errors
-/// `UploadsFull`, `QueueFull` or `Draining` before the body is read, and those of reading it: `UnsupportedMediaType`,
+/// `UploadsFull`, `UploadShareFull`, `QueueFull` or `Draining` before the body is read, and those of reading it: `UnsupportedMediaType`,
 /// `ContentEncoding`, `TooLarge`, `ParametersTooLarge`, `BodyTimeout`, `EmptyBody`, `Malformed` or `Invalid`.
 pub async fn receive_scan<P: Parameters>(
     app: &App,
     request: Request,
 ) -> Result<ScanRequest<P>, RequestError> {
-    match app.upload_permit() {
+    match app.upload_permit_of(&request, app.limits.body) {
         Ok(upload) => read_scan(request, upload, &app.limits).await,
         Err(error) => {
             discard(request, &app.limits);
@@ -283,8 +296,7 @@ async fn read_bytes(body: &mut Body, limits: &RequestLimits) -> Result<Bytes, Re
     let timer = BodyTimer::new(limits);
     let mut bytes = BytesMut::new();
     while let Some(piece) = timer.next(next_piece(body)).await? {
-        let piece = piece
-            .map_err(|error| RequestError::Malformed(format!("the body broke off: {error}")))?;
+        let piece = piece.map_err(|error| timer.broken_off(&error))?;
         if bytes.len() + piece.len() > limits.body {
             return Err(RequestError::TooLarge { limit: limits.body });
         }

@@ -8,6 +8,12 @@ use super::telemetry::LogFormat;
 
 /// Upper bound of the settings `queue` and `uploads`.
 const MAX_WAITING: usize = 65_536;
+/// Upper bound of the settings of connections.
+const MAX_CONNECTIONS: usize = 1 << 20;
+/// Connections without a setting, where the process may open enough files.
+const DEFAULT_CONNECTIONS: usize = 1024;
+/// Files that the process opens beside connections.
+const OTHER_FILES: usize = 32;
 
 /// Serve HTTP and gRPC.
 #[derive(Debug, Clone, Args)]
@@ -33,8 +39,24 @@ pub struct ServeArgs {
     #[arg(long, env = "DARN_QUEUE", value_name = "N", default_value = "32", value_parser = queue)]
     pub queue: usize,
 
-    /// Requests whose bodies are received at once; left out, four times workers and queue together. Bodies take at most this
-    /// plus workers plus queue times the body limit of memory
+    /// Connections open at once, at most 1048576; left out, 1024, or fewer where the process may open fewer files. A new one then takes
+    /// the place of the one that was silent for longest
+    #[arg(long, env = "DARN_CONNECTIONS", value_name = "N", value_parser = connections)]
+    pub connections: Option<usize>,
+
+    /// Connections of one address (IPv6: of one /64 network) open at once; 0 for any number. Each address may also hold half of the
+    /// uploads, unless this is 0. Behind a reverse proxy, to which all clients owe their address, set 0 or what the proxy opens
+    #[arg(
+        long,
+        env = "DARN_CONNECTIONS_PER_ADDRESS",
+        value_name = "N",
+        default_value = "64",
+        value_parser = connections_per_address
+    )]
+    pub connections_per_address: usize,
+
+    /// Bodies above 1 MiB, or of undeclared length, received at once, and as many smaller ones; left out, four times workers and queue
+    /// together. Bodies take at most this plus workers plus queue times the body limit of memory
     #[arg(long, env = "DARN_UPLOADS", value_name = "N", value_parser = uploads)]
     pub uploads: Option<usize>,
 
@@ -46,10 +68,15 @@ pub struct ServeArgs {
     #[arg(long, env = "DARN_BODY_LIMIT", value_name = "SIZE", default_value = "128MiB", value_parser = size)]
     pub body_limit: usize,
 
-    /// Longest pause between two pieces of a request; the whole body may take eight times as long. Who takes nothing of an answer, or
-    /// sends no request, for so long is let go
+    /// Longest pause between two pieces of a request or of an answer that is taken; a whole body or answer may take eight times as long.
+    /// Who sends no request for so long is let go
     #[arg(long, env = "DARN_BODY_TIMEOUT", value_name = "TIME", default_value = "15s", value_parser = duration)]
     pub body_timeout: Duration,
+
+    /// Fewest bytes per second of a request's body, and of an answer that is taken, over any time longer than the body timeout, such as
+    /// 512 or 4KiB; 0 for no such limit
+    #[arg(long, env = "DARN_BODY_RATE", value_name = "SIZE", default_value = "512", value_parser = rate)]
+    pub body_rate: usize,
 
     /// Longest time a shutdown waits for requests under way
     #[arg(long, env = "DARN_DRAIN", value_name = "TIME", default_value = "20s", value_parser = duration)]
@@ -95,6 +122,15 @@ impl ServeArgs {
         })
     }
 
+    /// Connections open at once. Without a setting 1024, or what the files leave that the process may open.
+    pub fn connections(&self) -> usize {
+        self.connections.unwrap_or_else(|| {
+            let files = open_file_limit().unwrap_or(usize::MAX);
+            let least = OTHER_FILES / 2;
+            (files.saturating_sub(OTHER_FILES)).clamp(least, DEFAULT_CONNECTIONS)
+        })
+    }
+
     /// Bodies received at once. Without a setting four times the workers and the queue together.
     pub fn uploads(&self) -> usize {
         self.uploads
@@ -112,6 +148,21 @@ fn queue(text: &str) -> Result<usize, String> {
 
 fn uploads(text: &str) -> Result<usize, String> {
     within(text, 1..=MAX_WAITING)
+}
+
+fn connections(text: &str) -> Result<usize, String> {
+    within(text, 1..=MAX_CONNECTIONS)
+}
+
+fn connections_per_address(text: &str) -> Result<usize, String> {
+    within(text, 0..=MAX_CONNECTIONS)
+}
+
+/// Files that the process may open; `None` where the system does not say.
+fn open_file_limit() -> Option<usize> {
+    let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
+    let row = (limits.lines()).find_map(|line| line.strip_prefix("Max open files"))?;
+    row.split_whitespace().next()?.parse().ok()
 }
 
 fn within(text: &str, range: RangeInclusive<usize>) -> Result<usize, String> {
@@ -146,6 +197,11 @@ fn origin(text: &str) -> Result<String, String> {
     } else {
         Err("must be `*` or scheme://host, such as https://example.org, without a path".to_owned())
     }
+}
+
+/// A size, or 0.
+fn rate(text: &str) -> Result<usize, String> {
+    if text == "0" { Ok(0) } else { size(text) }
 }
 
 /// `64MiB`, `512KiB`, `1GiB` or plain bytes.
@@ -226,6 +282,10 @@ mod tests {
         let settings = Command::try_parse_from(["darn"]).unwrap().serve;
         assert_eq!(settings.body_limit, 128 << 20);
         assert!(settings.workers() >= 1);
+        assert!((1..=1024).contains(&settings.connections()));
+        assert_eq!(settings.body_rate, 512);
+        let unlimited = Command::try_parse_from(["darn", "--body-rate", "0"]);
+        assert_eq!(unlimited.unwrap().serve.body_rate, 0);
         let error = Command::try_parse_from(["darn", "--workers", "0"])
             .unwrap_err()
             .to_string();
@@ -238,6 +298,9 @@ mod tests {
             ["--queue", "99999999999999999999"],
             ["--queue", "65537"],
             ["--uploads", "0"],
+            ["--connections", "0"],
+            ["--connections-per-address", "1048577"],
+            ["--body-rate", "fast"],
         ] {
             assert!(
                 Command::try_parse_from(["darn"].iter().chain(&bad)).is_err(),

@@ -1,4 +1,5 @@
-//! One listening socket: accepts connections, has hyper serve them, and closes those whose peer is silent or does not read.
+//! One listening socket: accepts connections, has hyper serve them, and closes those whose peer is silent or does not read, and those
+//! that are too many.
 //!
 //! axum's own `serve` gives hyper no timer: a peer that sends half a request, never reads its answer or has vanished would keep its
 //! file descriptor and its answer forever.
@@ -7,16 +8,16 @@ use std::{
     future::Future as _,
     io,
     pin::Pin,
+    sync::Arc,
     task::{Context, Poll, ready},
     time::Duration,
 };
 
 use axum::{Router, http::Request};
-use hyper::body::Incoming;
+use hyper::{body::Incoming, service::service_fn};
 use hyper_util::{
-    rt::{TokioExecutor, TokioIo, TokioTimer},
+    rt::{TokioIo, TokioTimer},
     server::{conn::auto, graceful::GracefulShutdown},
-    service::TowerToHyperService,
 };
 use tokio::{
     io::{AsyncRead, AsyncWrite, ReadBuf},
@@ -27,42 +28,92 @@ use tokio_util::sync::CancellationToken;
 use tower::ServiceExt as _;
 use tracing::{debug, error};
 
-use super::client_address::ClientAddress;
+use super::{
+    answer::{self, AnswerBody, StreamExecutor, while_read},
+    client_address::ClientAddress,
+    connection_table::{Activity, ConnectionTable, RequestTurn},
+    pace::PaceLimits,
+    request_body::RequestBody,
+};
 
 /// Bytes after which hyper knows the HTTP version and its own timers apply.
 const PREFACE_BYTES: usize = 24;
 
+/// Most requests of one HTTP/2 connection at once.
+const MAX_STREAMS: u32 = 32;
+/// Most streams that a peer may reset before they are served.
+const MAX_RESET_STREAMS: usize = 20;
+/// Most bytes of a request's headers over HTTP/2.
+const MAX_HEADER_BYTES: u32 = 16 << 10;
+/// Bytes that an HTTP/2 connection, and each of its streams, may send ahead.
+const RECEIVE_WINDOW: u32 = 1 << 20;
+
 /// Accepts and serves until `stop` is cancelled, then until the last request under way is answered.
 ///
-/// `pause` is the longest time a peer may take to send the head of a request, to read a piece of an answer, and (HTTP/2) to answer a ping.
-pub async fn serve(socket: TcpListener, router: Router, stop: CancellationToken, pause: Duration) {
-    let mut http = auto::Builder::new(TokioExecutor::new());
-    http.http1()
-        .timer(TokioTimer::new())
-        .header_read_timeout(pause);
-    http.http2()
-        .timer(TokioTimer::new())
-        .keep_alive_interval(pause)
-        .keep_alive_timeout(pause);
+/// A peer may take one pause to send the head of a request, to take a piece of an answer, and (HTTP/2) to answer a ping.
+pub async fn serve(
+    socket: TcpListener,
+    router: Router,
+    table: Arc<ConnectionTable>,
+    stop: CancellationToken,
+) {
+    let pace = table.limits.pace;
+    let http = http_settings(pace);
     let connections = GracefulShutdown::new();
     while let Some((stream, client)) = stop.run_until_cancelled(accept(&socket)).await {
-        let io = TokioIo::new(TimeoutStream::new(stream, pause));
+        let Some(admission) = table.admit(client) else {
+            debug!(address = %client.0, "too many connections; a new one is closed");
+            continue;
+        };
+        let activity = Arc::clone(&admission.activity);
+        let io = TimeoutStream::new(stream, pace.pause, Arc::clone(&activity));
         let router = router.clone();
-        let service =
-            TowerToHyperService::new(router.map_request(move |mut request: Request<Incoming>| {
-                request.extensions_mut().insert(client);
-                request
-            }));
-        let connection = http.serve_connection(io, service).into_owned();
-        let connection = connections.watch(connection);
+        let service = service_fn(move |request: Request<Incoming>| {
+            let turn = RequestTurn::new(&activity);
+            let guard = turn.guard();
+            let mut request = request.map(|body| RequestBody::new(body, pace, turn));
+            request.extensions_mut().insert(client);
+            let answer = router.clone().oneshot(request);
+            async move {
+                let answer = answer.await;
+                drop(guard);
+                answer.map(|answer| answer.map(|body| AnswerBody::new(body, pace)))
+            }
+        });
+        let connection = http.serve_connection(TokioIo::new(io), service);
+        let connection = connections.watch(connection.into_owned());
         tokio::spawn(async move {
-            if let Err(error) = connection.await {
-                debug!(%error, "a connection broke");
+            // Given back when the task ends.
+            let admission = admission;
+            let served = while_read(pace, connection);
+            match admission.close.run_until_cancelled(served).await {
+                Some(Some(Ok(()))) => {}
+                Some(Some(Err(error))) => debug!(error, "a connection broke"),
+                Some(None) => debug!("an answer was not taken; its connection is closed"),
+                None => debug!("a silent connection gives way to a new one"),
             }
         });
     }
     drop(socket);
     connections.shutdown().await;
+}
+
+fn http_settings(pace: PaceLimits) -> auto::Builder<StreamExecutor> {
+    let mut http = auto::Builder::new(StreamExecutor(pace));
+    http.http1()
+        .timer(TokioTimer::new())
+        .header_read_timeout(pace.pause);
+    http.http2()
+        .timer(TokioTimer::new())
+        .keep_alive_interval(pace.pause)
+        .keep_alive_timeout(pace.pause)
+        .max_concurrent_streams(MAX_STREAMS)
+        .max_pending_accept_reset_streams(MAX_RESET_STREAMS)
+        .max_header_list_size(MAX_HEADER_BYTES)
+        .max_send_buf_size(answer::MAX_BUFFERED_BYTES)
+        .initial_connection_window_size(RECEIVE_WINDOW)
+        .initial_stream_window_size(RECEIVE_WINDOW);
+    http
 }
 
 /// Waits for the next connection; retries after errors.
@@ -96,6 +147,7 @@ async fn accept(socket: &TcpListener) -> (TcpStream, ClientAddress) {
 struct TimeoutStream<S> {
     stream: S,
     pause: Duration,
+    activity: Arc<Activity>,
     /// Until when the peer must have sent its preface; `None` once it has.
     preface_timeout: Option<Pin<Box<Sleep>>>,
     /// Bytes read so far.
@@ -105,13 +157,20 @@ struct TimeoutStream<S> {
 }
 
 impl<S> TimeoutStream<S> {
-    fn new(stream: S, pause: Duration) -> Self {
+    fn new(stream: S, pause: Duration, activity: Arc<Activity>) -> Self {
         Self {
             stream,
             pause,
+            activity,
             preface_timeout: Some(Box::pin(time::sleep(pause))),
             read: 0,
             write_timeout: None,
+        }
+    }
+
+    fn note_written(&self, outcome: &Poll<io::Result<usize>>) {
+        if matches!(outcome, Poll::Ready(Ok(1..))) {
+            self.activity.touch();
         }
     }
 
@@ -151,9 +210,11 @@ impl<S: AsyncRead + Unpin> AsyncRead for TimeoutStream<S> {
             ready!(preface_timeout.as_mut().poll(cx));
             return Poll::Ready(Err(timed_out("the peer sends nothing")));
         }
-        self.read = self
-            .read
-            .saturating_add(buffer.filled().len().saturating_sub(before));
+        let read = buffer.filled().len().saturating_sub(before);
+        if read > 0 {
+            self.activity.touch();
+        }
+        self.read = self.read.saturating_add(read);
         if self.read >= PREFACE_BYTES {
             self.preface_timeout = None;
         }
@@ -168,6 +229,7 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for TimeoutStream<S> {
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
         let outcome = Pin::new(&mut self.stream).poll_write(cx, bytes);
+        self.note_written(&outcome);
         self.with_timeout(cx, outcome)
     }
 
@@ -177,6 +239,7 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for TimeoutStream<S> {
         pieces: &[io::IoSlice<'_>],
     ) -> Poll<io::Result<usize>> {
         let outcome = Pin::new(&mut self.stream).poll_write_vectored(cx, pieces);
+        self.note_written(&outcome);
         self.with_timeout(cx, outcome)
     }
 
@@ -205,7 +268,7 @@ mod tests {
     #[tokio::test]
     async fn a_peer_that_reads_nothing_times_out() {
         let (near, mut far) = duplex(64);
-        let mut near = TimeoutStream::new(near, PAUSE);
+        let mut near = TimeoutStream::new(near, PAUSE, Arc::default());
         let writing = tokio::spawn(async move { near.write_all(&[7; 320]).await });
         // Reading one piece per pause suffices, however long the whole takes.
         for _ in 0..3 {
@@ -220,14 +283,14 @@ mod tests {
     #[tokio::test]
     async fn a_peer_times_out_until_it_has_sent_its_preface() {
         let (near, mut far) = duplex(64);
-        let mut near = TimeoutStream::new(near, PAUSE);
+        let mut near = TimeoutStream::new(near, PAUSE, Arc::default());
         far.write_all(b"PRI * HTTP").await.unwrap();
         near.read_exact(&mut [0; 10]).await.unwrap();
         let error = near.read_u8().await.unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::TimedOut);
 
         let (near, mut far) = duplex(64);
-        let mut near = TimeoutStream::new(near, PAUSE);
+        let mut near = TimeoutStream::new(near, PAUSE, Arc::default());
         far.write_all(&[7; PREFACE_BYTES]).await.unwrap();
         near.read_exact(&mut [0; PREFACE_BYTES]).await.unwrap();
         // From here on hyper's timers apply.

@@ -24,13 +24,15 @@ pub enum RequestError {
     MethodNotAllowed,
     /// The body came too slowly.
     #[error(
-        "the body came too slowly: no pause may last longer than {seconds} s (DARN_BODY_TIMEOUT), and the whole no longer than {whole} s"
+        "the body came too slowly: no pause may last longer than {seconds} s (DARN_BODY_TIMEOUT), and the whole no longer than {whole} s; over longer than a pause at least {rate} bytes a second must come (DARN_BODY_RATE)"
     )]
     BodyTimeout {
         /// Longest pause, in seconds.
         seconds: f64,
         /// Longest time for the whole body, in seconds.
         whole: f64,
+        /// Fewest bytes a second.
+        rate: usize,
     },
     /// The body is larger than the limit.
     #[error("the body is larger than {limit} bytes, the limit of this service (DARN_BODY_LIMIT)")]
@@ -106,6 +108,16 @@ pub enum RequestError {
     )]
     UploadsFull {
         /// Most bodies received at once.
+        limit: usize,
+        /// Suggested seconds to wait.
+        retry_after: u64,
+    },
+    /// Too many bodies are being received from one address.
+    #[error(
+        "{limit} requests are being received from this address, half of what this service receives at once (DARN_UPLOADS); try again in {retry_after} s"
+    )]
+    UploadShareFull {
+        /// Most bodies received at once from one address.
         limit: usize,
         /// Suggested seconds to wait.
         retry_after: u64,
@@ -193,7 +205,7 @@ impl RequestError {
                 SessionError::Full { .. } => codes::SESSIONS_FULL,
             },
             Self::QueueFull { .. } => codes::QUEUE_FULL,
-            Self::UploadsFull { .. } => codes::UPLOADS_FULL,
+            Self::UploadsFull { .. } | Self::UploadShareFull { .. } => codes::UPLOADS_FULL,
             Self::Draining => codes::DRAINING,
             Self::WarmingUp => codes::WARMING_UP,
             Self::Deadline { .. } => codes::DEADLINE_EXCEEDED,
@@ -213,9 +225,9 @@ impl RequestError {
     /// After how many seconds the caller should try again; `None` when that would not help.
     pub fn retry_after(&self) -> Option<u64> {
         match self {
-            Self::QueueFull { retry_after, .. } | Self::UploadsFull { retry_after, .. } => {
-                Some(*retry_after)
-            }
+            Self::QueueFull { retry_after, .. }
+            | Self::UploadsFull { retry_after, .. }
+            | Self::UploadShareFull { retry_after, .. } => Some(*retry_after),
             Self::Draining | Self::WarmingUp | Self::Session(SessionError::Full { .. }) => Some(5),
             Self::Session(SessionError::Busy { .. }) => Some(1),
             _ => None,

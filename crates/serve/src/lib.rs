@@ -6,10 +6,12 @@
 #![warn(clippy::print_stderr, clippy::print_stdout)]
 
 mod accept;
+mod answer;
 mod app;
 mod body;
 mod client_address;
 mod config;
+mod connection_table;
 mod connections;
 mod ended_sessions;
 mod error;
@@ -25,9 +27,11 @@ mod kept_session;
 mod log_queue;
 mod media_types;
 pub mod openapi;
+mod pace;
 mod parameters;
 mod pool;
 mod problem;
+mod request_body;
 mod response;
 mod routes;
 mod schema;
@@ -36,6 +40,7 @@ mod session_store;
 mod shutdown;
 mod telemetry;
 mod threads;
+mod uploads;
 
 use std::{
     io,
@@ -162,28 +167,16 @@ pub async fn serve(
 ) -> Result<(), ServeError> {
     info!(address = %sockets.http.local_addr()?, "listening");
     let mut listeners = tokio::task::JoinSet::new();
-    let pause = app.limits.body_pause;
+    let listen = |socket, router| {
+        let table = Arc::clone(&app.connections);
+        connections::serve(socket, router, table, stop.clone())
+    };
     if let Some(socket) = sockets.grpc {
         info!(address = %socket.local_addr()?, "listening for grpc alone");
-        listeners.spawn(connections::serve(
-            socket,
-            grpc_router(&app),
-            stop.clone(),
-            pause,
-        ));
-        listeners.spawn(connections::serve(
-            sockets.http,
-            http_router(&app),
-            stop.clone(),
-            pause,
-        ));
+        listeners.spawn(listen(socket, grpc_router(&app)));
+        listeners.spawn(listen(sockets.http, http_router(&app)));
     } else {
-        listeners.spawn(connections::serve(
-            sockets.http,
-            router(&app),
-            stop.clone(),
-            pause,
-        ));
+        listeners.spawn(listen(sockets.http, router(&app)));
     }
     let upkeep = tokio::spawn(upkeep(Arc::clone(&app)));
     let drained = tokio::spawn({

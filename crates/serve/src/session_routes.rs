@@ -78,8 +78,9 @@ async fn open(State(app): State<Arc<App>>, request: Request) -> Result<Response,
 async fn describe(
     State(app): State<Arc<App>>,
     SessionId(id): SessionId,
+    request: Request,
 ) -> Result<Response, RequestError> {
-    let upload = session_permit(&app, id)?;
+    let upload = session_permit(&app, id, &request)?;
     let idle_seconds = app.sessions.limits().idle.as_secs_f64();
     let text = app
         .submit_to_session(id, upload, move |session, _| {
@@ -134,7 +135,7 @@ async fn result(
     request: Request,
 ) -> Result<Response, RequestError> {
     let media_type = preferred(request.headers(), &[GLB, GLTF, MULTIPART_MIXED]);
-    let upload = session_permit(&app, id)?;
+    let upload = session_permit(&app, id, &request)?;
     let service = Arc::clone(&app);
     app.submit_to_session(id, upload, move |session, cancellation| {
         let mended = session.result(cancellation)?;
@@ -161,10 +162,10 @@ struct SessionRequest<P> {
 }
 
 /// Takes an upload permit for a request to a session that exists.
-fn session_permit(app: &App, id: Uuid) -> Result<UploadPermit, RequestError> {
+fn session_permit(app: &App, id: Uuid, request: &Request) -> Result<UploadPermit, RequestError> {
     app.check_serving()?;
     app.sessions.check(id, Instant::now())?;
-    app.upload_permit()
+    app.upload_permit_of(request, parameters::MAX_BYTES)
 }
 
 /// Receives a request to a session that exists.
@@ -173,7 +174,7 @@ async fn receive<P: Parameters>(
     id: Uuid,
     request: Request,
 ) -> Result<SessionRequest<P>, RequestError> {
-    match session_permit(app, id) {
+    match session_permit(app, id, &request) {
         Ok(upload) => Ok(SessionRequest {
             parameters: body::read_parameters(request, &app.limits).await?,
             upload,

@@ -1,0 +1,247 @@
+//! How many bodies are received at once, by size and by client: who sends slowly must not keep others from being heard.
+
+use std::{
+    collections::HashMap,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+};
+
+use axum::body::{Body, HttpBody as _};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+
+use super::{client_address::ClientAddress, parameters};
+
+/// Most bytes of a small body. Edits of a session are never larger.
+const SMALL_BODY: u64 = parameters::MAX_BYTES as u64;
+/// Most requests without a body between their arrival and the queue; each holds next to nothing.
+const MAX_BODILESS: usize = 1 << 20;
+
+/// The size of a body, as its request declares it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BodySize {
+    /// There is no body.
+    None,
+    /// At most 1 MiB.
+    Small,
+    /// Larger, or not declared.
+    Large,
+}
+
+impl BodySize {
+    /// The size of a body of which at most `limit` bytes are read.
+    pub fn of(body: &Body, limit: usize) -> Self {
+        let declared = body.size_hint().upper().unwrap_or(u64::MAX);
+        match declared.min(limit as u64) {
+            0 => Self::None,
+            ..=SMALL_BODY => Self::Small,
+            _ => Self::Large,
+        }
+    }
+}
+
+/// Why a body is not received now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum UploadRefusal {
+    /// So many bodies of its size are being received.
+    Full(usize),
+    /// So many bodies of its size are being received from its address.
+    ShareFull(usize),
+}
+
+/// The bodies being received. Those of each size have slots of their own, and one address may hold half of them.
+#[derive(Debug)]
+pub struct Uploads {
+    bodiless: Slots,
+    small: Slots,
+    large: Slots,
+}
+
+impl Uploads {
+    /// So many slots for small bodies, and as many for large ones. `shared` when one address may hold half of them only.
+    pub fn new(slots: usize, sharing: Sharing) -> Self {
+        let share = match sharing {
+            Sharing::ByAddress => slots.div_ceil(2),
+            Sharing::Anybody => slots,
+        };
+        Self {
+            bodiless: Slots::new(MAX_BODILESS, MAX_BODILESS),
+            small: Slots::new(slots, share),
+            large: Slots::new(slots, share),
+        }
+    }
+
+    /// Takes a slot.
+    ///
+    /// # Errors
+    /// All slots of this size are taken, or this client's share of them.
+    pub fn take(
+        &self,
+        size: BodySize,
+        client: Option<ClientAddress>,
+    ) -> Result<UploadSlot, UploadRefusal> {
+        let slots = match size {
+            BodySize::None => &self.bodiless,
+            BodySize::Small => &self.small,
+            BodySize::Large => &self.large,
+        };
+        slots.take(client)
+    }
+
+    /// Waits until no slot is taken.
+    pub async fn drained(&self) {
+        for slots in [&self.bodiless, &self.small, &self.large] {
+            let all = u32::try_from(slots.limit).unwrap_or(u32::MAX);
+            // The semaphore is never closed, so this is never an error.
+            slots.free.acquire_many(all).await.ok();
+        }
+    }
+}
+
+/// Whether addresses tell clients apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sharing {
+    /// One address may hold half of the slots.
+    ByAddress,
+    /// Anybody may hold all slots: behind a proxy all clients have one address.
+    Anybody,
+}
+
+/// Slots for bodies of one size.
+#[derive(Debug)]
+struct Slots {
+    free: Arc<Semaphore>,
+    limit: usize,
+    /// Most slots of one address.
+    share: usize,
+    held: Arc<Held>,
+}
+
+impl Slots {
+    fn new(limit: usize, share: usize) -> Self {
+        Self {
+            free: Arc::new(Semaphore::new(limit)),
+            limit,
+            share,
+            held: Arc::default(),
+        }
+    }
+
+    fn take(&self, client: Option<ClientAddress>) -> Result<UploadSlot, UploadRefusal> {
+        let share = match client {
+            Some(client) if self.share < self.limit => {
+                let share = Held::take(&self.held, client, self.share);
+                Some(share.ok_or(UploadRefusal::ShareFull(self.share))?)
+            }
+            _ => None,
+        };
+        let slot = Arc::clone(&self.free).try_acquire_owned();
+        Ok(UploadSlot {
+            _slot: slot.map_err(|_| UploadRefusal::Full(self.limit))?,
+            _share: share,
+        })
+    }
+}
+
+/// A slot; given back when dropped.
+#[derive(Debug)]
+pub struct UploadSlot {
+    _slot: OwnedSemaphorePermit,
+    _share: Option<Share>,
+}
+
+/// Slots that each address holds.
+#[derive(Debug, Default)]
+struct Held(Mutex<HashMap<ClientAddress, usize>>);
+
+impl Held {
+    fn lock(&self) -> MutexGuard<'_, HashMap<ClientAddress, usize>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// One more slot for a client, unless it holds `most` already.
+    fn take(self: &Arc<Self>, client: ClientAddress, most: usize) -> Option<Share> {
+        let mut held = self.lock();
+        let count = held.get(&client).copied().unwrap_or(0);
+        if count >= most {
+            return None;
+        }
+        held.insert(client, count + 1);
+        drop(held);
+        let held = Arc::clone(self);
+        Some(Share { client, held })
+    }
+}
+
+/// One slot of a client; given back when dropped.
+#[derive(Debug)]
+struct Share {
+    client: ClientAddress,
+    held: Arc<Held>,
+}
+
+impl Drop for Share {
+    fn drop(&mut self) {
+        let mut held = self.held.lock();
+        match held.get_mut(&self.client) {
+            Some(count) if *count > 1 => *count -= 1,
+            _ => drop(held.remove(&self.client)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn client(last: u8) -> Option<ClientAddress> {
+        Some(ClientAddress::of([192, 0, 2, last].into()))
+    }
+
+    #[test]
+    fn one_address_holds_at_most_half_of_the_slots() {
+        let uploads = Uploads::new(3, Sharing::ByAddress);
+        let take = |size, last| uploads.take(size, client(last));
+        let first = take(BodySize::Large, 1).unwrap();
+        let _second = take(BodySize::Large, 1).unwrap();
+        let refusal = take(BodySize::Large, 1).unwrap_err();
+        assert_eq!(refusal, UploadRefusal::ShareFull(2));
+        assert!(take(BodySize::Small, 1).is_ok(), "sizes are apart");
+        let _third = take(BodySize::Large, 2).unwrap();
+        let refusal = take(BodySize::Large, 2).unwrap_err();
+        assert_eq!(refusal, UploadRefusal::Full(3));
+        drop(first);
+        assert!(take(BodySize::Large, 1).is_ok());
+    }
+
+    #[test]
+    fn an_address_that_holds_nothing_is_forgotten() {
+        let uploads = Uploads::new(4, Sharing::ByAddress);
+        let slots = [(); 2].map(|()| uploads.take(BodySize::Small, client(1)).unwrap());
+        drop(slots);
+        assert!(uploads.small.held.lock().is_empty());
+    }
+
+    #[test]
+    fn anybody_may_hold_all_slots_where_addresses_say_nothing() {
+        let uploads = Uploads::new(2, Sharing::Anybody);
+        let _slots = [(); 2].map(|()| uploads.take(BodySize::Large, client(1)).unwrap());
+        let refusal = uploads.take(BodySize::Large, client(1)).unwrap_err();
+        assert_eq!(refusal, UploadRefusal::Full(2));
+    }
+
+    #[test]
+    fn a_body_has_the_size_that_it_declares_or_that_is_read() {
+        let large = 1 << 30;
+        for (body, limit, size) in [
+            (Body::empty(), large, BodySize::None),
+            (Body::from("cloth"), large, BodySize::Small),
+            (Body::from(vec![7; 2 << 20]), large, BodySize::Large),
+            (
+                Body::from(vec![7; 2 << 20]),
+                parameters::MAX_BYTES,
+                BodySize::Small,
+            ),
+        ] {
+            assert_eq!(BodySize::of(&body, limit), size);
+        }
+    }
+}
