@@ -162,7 +162,7 @@ impl App {
     /// # Errors
     /// `UploadsFull`, `QueueFull` or `Draining`.
     pub fn upload_permit(&self) -> Result<UploadPermit, RequestError> {
-        self.take_upload(BodySize::Large, None)
+        self.upload_permit_for(BodySize::Large, None)
     }
 
     /// Takes an upload permit before a request's body is read, of which at most `limit` bytes count.
@@ -175,11 +175,14 @@ impl App {
         limit: usize,
     ) -> Result<UploadPermit, RequestError> {
         let client = request.extensions().get::<ClientAddress>().copied();
-        self.take_upload(BodySize::of(request.body(), limit), client)
+        self.upload_permit_for(BodySize::of(request.body(), limit), client)
     }
 
-    /// Takes an upload permit, only while the queue has room.
-    fn take_upload(
+    /// Takes an upload permit for a body of this size, and only while the queue has room.
+    ///
+    /// # Errors
+    /// `UploadsFull`, `UploadShareFull`, `QueueFull` or `Draining`.
+    pub(crate) fn upload_permit_for(
         &self,
         size: BodySize,
         client: Option<ClientAddress>,

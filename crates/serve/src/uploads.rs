@@ -32,7 +32,7 @@ impl BodySize {
         let declared = body.size_hint().upper().unwrap_or(u64::MAX);
         match declared.min(limit as u64) {
             0 => Self::None,
-            ..=SMALL_BODY => Self::Small,
+            1..=SMALL_BODY => Self::Small,
             _ => Self::Large,
         }
     }
