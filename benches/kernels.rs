@@ -3,10 +3,11 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use darn_budget::Budget;
 use darn_geometry::flatten::{self, Chart};
 use darn_geometry::grid::{CELLS, Grid};
 use darn_geometry::mesh::loops::{LoopKind, boundary_loops};
-use darn_geometry::mesh::region::{Region, grow};
+use darn_geometry::mesh::region::{BoundedMesh, Region, grow};
 use darn_geometry::mesh::weld::weld;
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
 use darn_geometry::patch::{self, Firmness, PatchOptions, Pull};
@@ -33,8 +34,19 @@ fn hole() -> Hole {
     let loops = boundary_loops(&welded.mesh, &topology);
     let rim = loops.iter().find(|l| l.kind == LoopKind::Hole);
     let rim = rim.expect("the example has a hole").id;
-    let region = grow(&welded.mesh, &topology, &loops, rim, REACH).expect("it is a disk");
-    let chart = flatten::flatten(&region, &Default::default()).expect("it lies flat");
+    let region = grow(
+        &BoundedMesh {
+            mesh: &welded.mesh,
+            topology: &topology,
+            loops: &loops,
+        },
+        rim,
+        REACH,
+        Budget::unlimited(),
+    )
+    .expect("it is a disk");
+    let chart =
+        flatten::flatten(&region, &Default::default(), Budget::unlimited()).expect("it lies flat");
     let grid = flatten::raster(&region.mesh, &chart);
     Hole {
         surface: scan.surface,
@@ -48,7 +60,13 @@ fn mesh(c: &mut Criterion) {
     let hole = hole();
     c.bench_function("weld", |b| b.iter(|| weld(black_box(&hole.surface))));
     c.bench_function("flatten", |b| {
-        b.iter(|| flatten::flatten(black_box(&hole.region), &Default::default()))
+        b.iter(|| {
+            flatten::flatten(
+                black_box(&hole.region),
+                &Default::default(),
+                Budget::unlimited(),
+            )
+        })
     });
     c.bench_function("raster", |b| {
         b.iter(|| flatten::raster(black_box(&hole.region.mesh), &hole.chart))

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use clap::Parser;
-use darn_contract::port::Cancellation;
+use darn_budget::Budget;
 use darn_contract::{Anchor, Constraints, Edit, Gesture, Search};
 use darn_geometry::mesh::curvature::vertex_normals;
 use darn_geometry::mesh::{Vec2, Vec3};
@@ -138,7 +138,7 @@ impl Case {
             scan,
             &Constraints::default(),
             Arc::clone(mender),
-            Cancellation::NEVER,
+            Budget::unlimited(),
         )
         .ok()?;
         let open_ms = started.elapsed().as_secs_f64() * 1e3;
@@ -152,7 +152,7 @@ impl Case {
         let low = uvs[..rim].iter().fold(Vec2::repeat(1.0), |m, uv| m.inf(uv));
         let high = uvs[..rim].iter().fold(Vec2::zeros(), |m, uv| m.sup(uv));
         let (positions, report) = session
-            .call(Cancellation::NEVER)
+            .call(Budget::unlimited())
             .positions(&Constraints::default())
             .ok()?;
         let cell = report.holes.get(place)?.grid?.spacing_mean;
@@ -198,7 +198,7 @@ impl Case {
     /// Distance to the anchor and how much of it is beyond reach, in cells; the largest stretch.
     fn kept(&self, vertex: usize, by: Vec3) -> Result<([f64; 3], Vec<Vec3>), darn_mend::MendError> {
         let asked = anchored(vec![self.anchor(vertex, by)]);
-        let (mut positions, report) = self.session.call(Cancellation::NEVER).positions(&asked)?;
+        let (mut positions, report) = self.session.call(Budget::unlimited()).positions(&asked)?;
         let hole = &report.holes[0];
         let (anchor, patch) = (&hole.anchors[0], hole.patch.clone().unwrap_or_default());
         let numbers = [
@@ -215,7 +215,7 @@ impl Case {
             .collect();
         let (positions, plain) = self
             .session
-            .call(Cancellation::NEVER)
+            .call(Budget::unlimited())
             .positions(&anchored(still))?;
         let squares = positions[0].iter().zip(&self.positions).skip(self.rim);
         let squares: f64 = squares.map(|(a, b)| (a - b).norm_squared()).sum();
@@ -242,7 +242,7 @@ impl Case {
             },
         };
         self.session
-            .call(Cancellation::NEVER)
+            .call(Budget::unlimited())
             .positions(&Constraints {
                 edits: vec![grab],
                 ..Constraints::default()
@@ -269,11 +269,11 @@ impl Case {
         };
         let found = self
             .session
-            .call(Cancellation::NEVER)
+            .call(Budget::unlimited())
             .optimize_anchor(&search)?;
         let best = self
             .session
-            .call(Cancellation::NEVER)
+            .call(Budget::unlimited())
             .optimize_anchor(&Search {
                 exhaustive: true,
                 ..search

@@ -13,8 +13,7 @@ pub struct ServeCommand {
     #[command(flatten)]
     pub serve: ServeArgs,
 
-    /// Threads that all workers share for what can be divided (a mend's copies of a grid, its holes), at most 1024; left out, one per
-    /// processor
+    /// Threads of each mend for what can be divided (its holes, copies of a grid), at most 8 of these; left out, one per processor
     #[arg(long, env = "DARN_THREADS", value_name = "N", value_parser = threads)]
     pub threads: Option<usize>,
 

@@ -2,6 +2,7 @@
 
 use super::failure::{Failure, OrFail};
 use super::files;
+use darn_budget::Budget;
 use darn_contract::v1::{HolesReport, Loop, LoopKind};
 use darn_gltf_scan::{Scan, ScanLimits};
 use std::path::PathBuf;
@@ -20,7 +21,7 @@ pub fn run(args: &HolesArgs) -> Result<(), Failure> {
     let bytes = files::read(&args.scan)?;
     let name = args.scan.display();
     let scan = Scan::read(bytes, &ScanLimits::default()).or_fail(format!("read {name}"))?;
-    let report = darn_mend::find_holes(&scan);
+    let report = darn_mend::find_holes(&scan, Budget::unlimited()).or_fail("find the holes")?;
     if args.json {
         println!(
             "{}",

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use darn_contract::port::Cancellation;
+use darn_budget::Budget;
 use darn_contract::{Anchor, Constraints, Edit, Gesture, Search};
 use darn_geometry::mesh::{Vec2, Vec3};
 use darn_lab::scarffolds::sheets::SimulatedSheet;
@@ -24,7 +24,7 @@ struct EditedSheet {
 
 impl EditedSheet {
     fn call(&self) -> SessionCall<'_> {
-        self.session.call(Cancellation::NEVER)
+        self.session.call(Budget::unlimited())
     }
 
     fn of(sheet: &SimulatedSheet) -> EditedSheet {
@@ -33,13 +33,13 @@ impl EditedSheet {
             scan,
             &Constraints::default(),
             Arc::clone(mender()),
-            Cancellation::NEVER,
+            Budget::unlimited(),
         )
         .unwrap();
         let described = session.described();
         let hole = &described.holes[0];
         let (mut positions, report) = session
-            .call(Cancellation::NEVER)
+            .call(Budget::unlimited())
             .positions(&Constraints::default())
             .unwrap();
         let grid = report.holes[0].grid.unwrap();
@@ -353,7 +353,7 @@ fn a_session_answers_as_single_calls_do() {
         read(&bytes),
         &Constraints::default(),
         Arc::clone(mender()),
-        Cancellation::NEVER,
+        Budget::unlimited(),
     )
     .unwrap();
     let cloth = EditedSheet::of(&sheet);
@@ -370,7 +370,7 @@ fn a_session_answers_as_single_calls_do() {
         Constraints::default(),
     ] {
         let kept = session
-            .call(Cancellation::NEVER)
+            .call(Budget::unlimited())
             .mended(&constraints)
             .unwrap();
         let single = mended(&bytes, &constraints).unwrap();
@@ -379,8 +379,8 @@ fn a_session_answers_as_single_calls_do() {
     }
 
     // The patches alone have the same vertices.
-    let (glb, _) = session.call(Cancellation::NEVER).glb(&asked).unwrap();
-    let (positions, _) = session.call(Cancellation::NEVER).positions(&asked).unwrap();
+    let (glb, _) = session.call(Budget::unlimited()).glb(&asked).unwrap();
+    let (positions, _) = session.call(Budget::unlimited()).positions(&asked).unwrap();
     let alone = read(&glb);
     assert_eq!(alone.surface.positions.len(), positions[0].len());
     assert_eq!(
@@ -396,7 +396,7 @@ fn a_session_answers_as_single_calls_do() {
         map: false,
     };
     let kept = session
-        .call(Cancellation::NEVER)
+        .call(Budget::unlimited())
         .optimize_anchor(&search)
         .unwrap();
     let single = darn_mend::optimize_anchor(&read(&bytes), &search, mender()).unwrap();
@@ -428,7 +428,7 @@ fn a_session_describes_its_holes() {
         scan,
         &anchored(vec![anchor]),
         Arc::clone(mender()),
-        Cancellation::NEVER,
+        Budget::unlimited(),
     )
     .err();
     assert_eq!(error.unwrap().fields()[0].pointer, "/anchors");

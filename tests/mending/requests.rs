@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use darn_contract::port::Cancellation;
+use darn_budget::{Budget, Exhausted, Limits};
 use darn_contract::{Anchor, Constraints, Edit, Gesture, HoleSelector};
 use darn_geometry::mesh::intersect::intersections_with;
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
@@ -234,17 +234,28 @@ fn more_holes_than_are_filled_at_once_are_refused() {
 }
 
 #[test]
-fn a_cancelled_call_is_abandoned() {
+fn a_call_ends_whenever_it_is_cancelled() {
     let scan = read(&pair());
     let asked = AtomicUsize::new(0);
-    // Cancelled when the second hole has been prepared.
-    let cancelled = || asked.fetch_add(1, Ordering::Relaxed) >= 2;
-    let call = Call {
-        mender: mender(),
-        cancellation: Cancellation::new(&cancelled),
+    // Cancelled when the budget is asked for the nth time.
+    let mend_until = |n: usize| {
+        asked.store(0, Ordering::Relaxed);
+        let cancelled = || asked.fetch_add(1, Ordering::Relaxed) >= n;
+        let call = Call {
+            mender: mender(),
+            budget: &Budget::new(Limits::default(), &cancelled),
+        };
+        mend(&scan, &Constraints::default(), call).err()
     };
-    let error = mend(&scan, &Constraints::default(), call).unwrap_err();
-    assert!(matches!(error, MendError::Abandoned), "{error}");
+    assert!(mend_until(usize::MAX).is_none());
+    let all = asked.load(Ordering::Relaxed);
+    assert!(all > 100, "the budget was asked {all} times");
+    let moments = (0..10).map(|k| k * k * all / 100);
+    for n in moments {
+        let error = mend_until(n).expect("cancelled");
+        let cancelled = matches!(error, MendError::Exhausted(Exhausted::Cancelled));
+        assert!(cancelled, "{n}: {error}");
+    }
 }
 
 #[test]

@@ -10,7 +10,8 @@ use std::{
 };
 
 use axum::body::Bytes;
-use darn_contract::port::{Cancellation, EditSession, Mended, Mender, PatchForm, Patches, Refusal};
+use darn_budget::Budget;
+use darn_contract::port::{EditSession, Mended, Mender, PatchForm, Patches, Refusal};
 use darn_contract::{Anchor, Code, Constraints, FieldError, Search, codes, v1};
 use serde_json::{Value, json};
 
@@ -350,7 +351,7 @@ impl EditSession for FakeSession {
         &self,
         constraints: &Constraints,
         form: PatchForm,
-        _: Cancellation<'_>,
+        _: &Budget<'_>,
     ) -> Result<Patches, Refusal> {
         self.fake.act_on_edit(constraints)?;
         let positions = constraints.anchors.iter().flat_map(|a| a.position);
@@ -364,7 +365,7 @@ impl EditSession for FakeSession {
         })
     }
 
-    fn mended(&self, constraints: &Constraints, _: Cancellation<'_>) -> Result<Mended, Refusal> {
+    fn mended(&self, constraints: &Constraints, _: &Budget<'_>) -> Result<Mended, Refusal> {
         let xs: Vec<f64> = constraints.anchors.iter().map(|a| a.position[0]).collect();
         Ok(Mended {
             bytes: format!("glTF {} {xs:?}", self.scan.name).into_bytes(),
@@ -373,11 +374,7 @@ impl EditSession for FakeSession {
         })
     }
 
-    fn optimize_anchor(
-        &self,
-        search: &Search,
-        _: Cancellation<'_>,
-    ) -> Result<v1::AnchorFound, Refusal> {
+    fn optimize_anchor(&self, search: &Search, _: &Budget<'_>) -> Result<v1::AnchorFound, Refusal> {
         Ok(found(search))
     }
 }
@@ -387,7 +384,7 @@ impl Mender for FakeMender {
         &self,
         scan: Bytes,
         constraints: &Constraints,
-        _: Cancellation<'_>,
+        _: &Budget<'_>,
     ) -> Result<Mended, Refusal> {
         self.act_on_scan(&scan)?;
         Ok(Mended {
@@ -401,7 +398,7 @@ impl Mender for FakeMender {
         &self,
         scan: Bytes,
         search: &Search,
-        _: Cancellation<'_>,
+        _: &Budget<'_>,
     ) -> Result<v1::AnchorFound, Refusal> {
         self.act_on_scan(&scan)?;
         Ok(found(search))
@@ -411,7 +408,7 @@ impl Mender for FakeMender {
         &self,
         scan: Bytes,
         search: &Search,
-        cancellation: Cancellation<'_>,
+        budget: &Budget<'_>,
     ) -> Result<Mended, Refusal> {
         let anchor = Anchor {
             hole: search.hole,
@@ -423,20 +420,20 @@ impl Mender for FakeMender {
             anchors: vec![anchor],
             ..Constraints::default()
         };
-        self.inpaint(scan, &constraints, cancellation)
+        self.inpaint(scan, &constraints, budget)
     }
 
     fn open(
         &self,
         scan: Bytes,
         _: &Constraints,
-        _: Cancellation<'_>,
+        _: &Budget<'_>,
     ) -> Result<Box<dyn EditSession>, Refusal> {
         let scan = self.act_on_scan(&scan)?;
         Ok(Box::new(FakeSession::new(self, scan)))
     }
 
-    fn find_holes(&self, scan: Bytes) -> Result<v1::HolesReport, Refusal> {
+    fn find_holes(&self, scan: Bytes, _: &Budget<'_>) -> Result<v1::HolesReport, Refusal> {
         self.act_on_scan(&scan)?;
         let hole = v1::Loop {
             id: 2,

@@ -325,3 +325,21 @@ async fn a_connection_that_reads_no_answer_is_closed() {
     ended.expect("still open").ok();
     assert!(rest.len() < SCAN, "the whole answer was sent");
 }
+
+#[tokio::test]
+async fn bodies_beyond_the_memory_are_refused_and_their_memory_comes_back() {
+    let service = Service::start(&["--memory", "8MiB", "--body-limit", "64MiB"]).await;
+    let post = |bytes: usize| {
+        let request = service.post("/inpaint");
+        let request = request.header("content-type", "model/gltf-binary");
+        request.body(vec![7; bytes]).send()
+    };
+    for _ in 0..3 {
+        let refused = post(20 << 20).await.unwrap();
+        assert_eq!(refused.status(), 503);
+        assert_eq!(refused.headers()["retry-after"], "5");
+        assert_eq!(problem(refused).await["code"], "memory_full");
+        // Three times: what was counted for the refused body is free again.
+        assert_eq!(post(2 << 20).await.unwrap().status(), 200);
+    }
+}

@@ -110,6 +110,8 @@ codes! {
     INTERNAL = "internal", 500, Internal;
     /// Too many jobs wait.
     QUEUE_FULL = "queue_full", 503, Unavailable;
+    /// Other requests hold the service's memory.
+    MEMORY_FULL = "memory_full", 503, Unavailable;
     /// Too many bodies are being received.
     UPLOADS_FULL = "uploads_full", 503, Unavailable;
     /// The service shuts down.
@@ -146,6 +148,12 @@ codes! {
     CONSTRAINTS_DO_NOT_FIT = "constraints_do_not_fit", 422, FailedPrecondition;
     /// The cloth does not reach a hard anchor.
     ANCHOR_OUT_OF_REACH = "anchor_out_of_reach", 422, FailedPrecondition;
+    /// The request needs more work than its size allows.
+    TOO_MUCH_WORK = "too_much_work", 422, FailedPrecondition;
+    /// The request needs more memory than its size allows.
+    TOO_MUCH_MEMORY = "too_much_memory", 422, FailedPrecondition;
+    /// The answer would be larger than its limit.
+    ANSWER_TOO_LARGE = "answer_too_large", 422, FailedPrecondition;
     /// The scan has no hole to fill.
     NO_HOLES = "no_holes", 422, FailedPrecondition;
     /// More holes than are filled at once.

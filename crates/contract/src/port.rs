@@ -2,9 +2,8 @@
 //!
 //! The service knows no scan, mesh or network: it is given a [`Mender`].
 
-use std::fmt;
-
 use bytes::Bytes;
+use darn_budget::Budget;
 
 use crate::{Code, Constraints, FieldError, Search, codes, v1};
 
@@ -19,39 +18,8 @@ pub struct Mended {
     pub report: v1::Report,
 }
 
-/// The caller's cancellation check: whether the answer is still waited for. Cheap; may be called from any thread. A mender calls it
-/// before each hole and each step of a search; after a cancellation it returns any refusal, which nobody reads.
-#[derive(Clone, Copy)]
-pub struct Cancellation<'a> {
-    cancelled: &'a (dyn Fn() -> bool + Sync),
-}
-
-impl<'a> Cancellation<'a> {
-    /// A call that is never cancelled.
-    pub const NEVER: Cancellation<'static> = Cancellation {
-        cancelled: &|| false,
-    };
-
-    /// A call that is cancelled once `cancelled` returns true.
-    pub fn new(cancelled: &'a (dyn Fn() -> bool + Sync)) -> Cancellation<'a> {
-        Cancellation { cancelled }
-    }
-
-    /// Whether nobody waits for the answer any more.
-    pub fn is_cancelled(&self) -> bool {
-        (self.cancelled)()
-    }
-}
-
-impl fmt::Debug for Cancellation<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Cancellation")
-            .field(&self.is_cancelled())
-            .finish()
-    }
-}
-
-/// Mends scans. Called from many worker threads at once; every call blocks until it is done. `scan` holds the bytes of a GLB, or of a
+/// Mends scans. Called from many worker threads at once; every call blocks until it is done, or until its budget is exhausted: a mender
+/// asks it in every loop whose length the input decides, and after a cancellation it returns any refusal, which nobody reads. `scan` holds the bytes of a GLB, or of a
 /// glTF JSON with data URIs; they are shared with the request, not copied.
 pub trait Mender: Send + Sync + 'static {
     /// Fills the selected holes.
@@ -62,7 +30,7 @@ pub trait Mender: Send + Sync + 'static {
         &self,
         scan: Bytes,
         constraints: &Constraints,
-        cancellation: Cancellation<'_>,
+        budget: &Budget<'_>,
     ) -> Result<Mended, Refusal>;
 
     /// Searches the uv of a hole's grid at which an anchor takes the cloth closest to a point in scene space.
@@ -73,7 +41,7 @@ pub trait Mender: Send + Sync + 'static {
         &self,
         scan: Bytes,
         search: &Search,
-        cancellation: Cancellation<'_>,
+        budget: &Budget<'_>,
     ) -> Result<v1::AnchorFound, Refusal>;
 
     /// The same search, then mends the hole with the anchor found.
@@ -84,7 +52,7 @@ pub trait Mender: Send + Sync + 'static {
         &self,
         scan: Bytes,
         search: &Search,
-        cancellation: Cancellation<'_>,
+        budget: &Budget<'_>,
     ) -> Result<Mended, Refusal>;
 
     /// Reads a scan and flattens its holes once, so that later calls need constraints alone. `constraints` select holes and weights.
@@ -95,14 +63,14 @@ pub trait Mender: Send + Sync + 'static {
         &self,
         scan: Bytes,
         constraints: &Constraints,
-        cancellation: Cancellation<'_>,
+        budget: &Budget<'_>,
     ) -> Result<Box<dyn EditSession>, Refusal>;
 
     /// Every boundary loop of a scan.
     ///
     /// # Errors
     /// The scan is not readable.
-    fn find_holes(&self, scan: Bytes) -> Result<v1::HolesReport, Refusal>;
+    fn find_holes(&self, scan: Bytes, budget: &Budget<'_>) -> Result<v1::HolesReport, Refusal>;
 
     /// Mends one small scan completely. The service is ready once it has succeeded.
     ///
@@ -129,18 +97,14 @@ pub trait EditSession: Send + Sync + 'static {
         &self,
         constraints: &Constraints,
         form: PatchForm,
-        cancellation: Cancellation<'_>,
+        budget: &Budget<'_>,
     ) -> Result<Patches, Refusal>;
 
     /// The whole scan mended with these anchors and edits: the bytes that the stateless [`Mender::inpaint`] returns.
     ///
     /// # Errors
     /// As [`EditSession::patches`].
-    fn mended(
-        &self,
-        constraints: &Constraints,
-        cancellation: Cancellation<'_>,
-    ) -> Result<Mended, Refusal>;
+    fn mended(&self, constraints: &Constraints, budget: &Budget<'_>) -> Result<Mended, Refusal>;
 
     /// The search of [`Mender::optimize_anchor`] on the kept scan.
     ///
@@ -149,7 +113,7 @@ pub trait EditSession: Send + Sync + 'static {
     fn optimize_anchor(
         &self,
         search: &Search,
-        cancellation: Cancellation<'_>,
+        budget: &Budget<'_>,
     ) -> Result<v1::AnchorFound, Refusal>;
 }
 

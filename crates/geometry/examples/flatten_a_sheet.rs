@@ -4,11 +4,12 @@
 
 use std::error::Error;
 
+use darn_budget::Budget;
 use darn_geometry::flatten::{FlattenLimits, flatten, raster};
 use darn_geometry::grid::CELLS;
 use darn_geometry::mesh::Vec3;
 use darn_geometry::mesh::loops::{LoopKind, boundary_loops};
-use darn_geometry::mesh::region::grow;
+use darn_geometry::mesh::region::{BoundedMesh, grow};
 use darn_geometry::mesh::shapes::{jitter, sheet};
 use darn_geometry::mesh::weld::weld;
 
@@ -41,8 +42,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     // The cloth around the hole, as a mesh of its own, laid flat.
     let hole = loops.iter().find(|rim| rim.kind == LoopKind::Hole);
     let hole = hole.ok_or("the sheet has no hole")?;
-    let region = grow(&welded.mesh, &topology, &loops, hole.id, REACH)?;
-    let chart = flatten(&region, &FlattenLimits::default())?;
+    let region = grow(
+        &BoundedMesh {
+            mesh: &welded.mesh,
+            topology: &topology,
+            loops: &loops,
+        },
+        hole.id,
+        REACH,
+        Budget::unlimited(),
+    )?;
+    let chart = flatten(&region, &FlattenLimits::default(), Budget::unlimited())?;
     println!(
         "{} faces laid flat in {} rounds: mean stretch {:.4}, largest {:.4}",
         region.faces.len(),

@@ -2,9 +2,10 @@
 
 use std::error::Error;
 
+use darn_budget::Budget;
 use darn_geometry::flatten::{FlattenLimits, flatten, raster};
 use darn_geometry::mesh::loops::{LoopKind, boundary_loops};
-use darn_geometry::mesh::region::grow;
+use darn_geometry::mesh::region::{BoundedMesh, grow};
 use darn_geometry::mesh::shapes::holed_sheet;
 use darn_geometry::mesh::weld::weld;
 use darn_geometry::patch::quality::measure;
@@ -21,10 +22,19 @@ fn main() -> Result<(), Box<dyn Error>> {
     let loops = boundary_loops(&welded.mesh, &topology);
     let hole = loops.iter().find(|l| l.kind == LoopKind::Hole);
     let hole = hole.ok_or("the sheet has no hole")?.id;
-    let region = grow(&welded.mesh, &topology, &loops, hole, REACH)?;
+    let region = grow(
+        &BoundedMesh {
+            mesh: &welded.mesh,
+            topology: &topology,
+            loops: &loops,
+        },
+        hole,
+        REACH,
+        Budget::unlimited(),
+    )?;
 
     // 2. The chart of the region, sampled on a grid.
-    let chart = flatten(&region, &FlattenLimits::default())?;
+    let chart = flatten(&region, &FlattenLimits::default(), Budget::unlimited())?;
     let grid = raster(&region.mesh, &chart);
 
     // 3. Positions for the unknown cells. A network fills the grid here in the service.

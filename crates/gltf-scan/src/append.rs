@@ -142,6 +142,11 @@ impl<'s> Appender<'s> {
         json!(self.push("accessors", accessor))
     }
 
+    /// Bytes of data appended so far, without JSON.
+    pub fn appended_bytes(&self) -> usize {
+        self.data.len()
+    }
+
     /// The whole scan, in the container it was read from.
     pub fn finish(mut self) -> Result<Vec<u8>, ScanError> {
         let too_long = |length: usize| ScanError::Container {

@@ -2,6 +2,8 @@
 //!
 //! Every variant about the file carries an RFC 6901 pointer into its JSON, so that a person can find the place.
 
+use darn_budget::Exhausted;
+
 /// Why a scan could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum ScanError {
@@ -75,6 +77,9 @@ pub enum ScanError {
         /// What was found: the count up to this place, inclusive.
         found: usize,
     },
+    /// The request's budget is exhausted.
+    #[error(transparent)]
+    Exhausted(#[from] Exhausted),
     /// The default scene draws no triangle.
     #[error("the default scene draws no triangles; there is nothing to mend")]
     NoTriangles,
@@ -108,6 +113,7 @@ impl ScanError {
             | Self::External { pointer, .. }
             | Self::Limit { pointer, .. } => Some(pointer),
             Self::Container { .. }
+            | Self::Exhausted(_)
             | Self::NoTriangles
             | Self::Singular { .. }
             | Self::InvalidPatch { .. } => None,

@@ -4,7 +4,8 @@
 //! A round trip through `serde_json::Value` changes characters: even with arbitrary precision it writes `1E5` as
 //! `1e+5`.
 
-use std::collections::BTreeMap;
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 
 use serde_json::Value;
@@ -20,6 +21,15 @@ pub(super) struct JsonEdit<'t> {
     edits: Vec<(Range<usize>, String)>,
     /// New members of the root object.
     members: String,
+    /// The children of values that a path led through, by where the value starts: every patch's path starts at the root,
+    /// and the text must not be parsed once for each patch.
+    children: HashMap<usize, Children<'t>>,
+}
+
+/// The texts of a value's children.
+enum Children<'t> {
+    Items(Vec<&'t RawValue>),
+    Members(BTreeMap<String, &'t RawValue>),
 }
 
 impl<'t> JsonEdit<'t> {
@@ -36,6 +46,7 @@ impl<'t> JsonEdit<'t> {
             root: root.get().trim(),
             edits: Vec::new(),
             members: String::new(),
+            children: HashMap::new(),
         })
     }
 
@@ -90,22 +101,20 @@ impl<'t> JsonEdit<'t> {
     }
 
     /// The text of the value at `path` (keys and array indices).
-    fn find(&self, path: &[&str]) -> Result<Option<&'t str>, ScanError> {
+    fn find(&mut self, path: &[&str]) -> Result<Option<&'t str>, ScanError> {
         let mut at = self.root;
         for (depth, key) in path.iter().enumerate() {
             let here = path.get(..depth).unwrap_or_default();
-            let next: Option<&'t RawValue> = match key.parse::<usize>() {
-                Ok(index) => {
-                    let items: Vec<&RawValue> =
-                        serde_json::from_str(at).map_err(|_| invalid(here, "must be an array"))?;
-                    items.get(index).copied()
-                }
-                Err(_) => {
-                    // Of repeated keys the last one counts, as in reading.
-                    let members: BTreeMap<String, &RawValue> =
-                        serde_json::from_str(at).map_err(|_| invalid(here, "must be an object"))?;
-                    members.get(*key).copied()
-                }
+            let start = self.span(at).start;
+            let children = match self.children.entry(start) {
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(new) => new.insert(Children::of(at, here)?),
+            };
+            let next = match (children, key.parse::<usize>()) {
+                (Children::Items(items), Ok(index)) => items.get(index).copied(),
+                (Children::Items(_), Err(_)) => return Err(invalid(here, "must be an object")),
+                (Children::Members(_), Ok(_)) => return Err(invalid(here, "must be an array")),
+                (Children::Members(members), Err(_)) => members.get(*key).copied(),
             };
             match next {
                 Some(next) => at = next.get(),
@@ -119,6 +128,17 @@ impl<'t> JsonEdit<'t> {
     fn span(&self, part: &str) -> Range<usize> {
         let start = (part.as_ptr() as usize).saturating_sub(self.text.as_ptr() as usize);
         start..start + part.len()
+    }
+}
+
+impl<'t> Children<'t> {
+    /// The children of the value with this text; of repeated keys the last one counts, as in reading.
+    fn of(text: &'t str, path: &[&str]) -> Result<Children<'t>, ScanError> {
+        let children = match text.trim_start().starts_with('[') {
+            true => serde_json::from_str(text).map(Children::Items),
+            false => serde_json::from_str(text).map(Children::Members),
+        };
+        children.map_err(|_| invalid(path, "must be an object or an array"))
     }
 }
 

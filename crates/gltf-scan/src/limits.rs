@@ -17,6 +17,8 @@ pub struct ScanLimits {
     pub max_attribute_values: usize,
     /// Sets of one primitive: of texture coordinates, of colours, and of joints with weights, each.
     pub max_attribute_sets: usize,
+    /// Morph targets of one primitive; every patch of its mesh gets as many.
+    pub max_morph_targets: usize,
     /// Values in the JSON, keys included; an upper estimate, made before they are parsed.
     pub max_json_values: usize,
 }
@@ -30,6 +32,7 @@ impl Default for ScanLimits {
             max_primitives: 10_000,
             max_attribute_values: 32_000_000,
             max_attribute_sets: 16,
+            max_morph_targets: 1024,
             max_json_values: 1_000_000,
         }
     }

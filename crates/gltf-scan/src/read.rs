@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::Range;
 
 use bytes::Bytes;
+use darn_budget::Budget;
 use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::mesh::{TRIANGLE_FAN, TRIANGLE_STRIP, TRIANGLES};
 use serde_json::Value;
@@ -14,7 +15,7 @@ use super::buffers::Document;
 use super::error::ScanError;
 use super::json::{JsonPlace, values_at_most};
 use super::limits::{Limit, ScanLimits};
-use super::scan::{Scan, ScanPart, VertexBlock};
+use super::scan::{Scan, ScanPart, VertexBlock, json_held};
 use super::scene::{MeshNode, mesh_nodes};
 use super::skin::skinned_meshes;
 use super::triangles::IndexList;
@@ -33,18 +34,38 @@ impl Scan {
     /// # Errors
     /// See [`ScanError`]; a scan that draws no triangle is [`ScanError::NoTriangles`].
     pub fn read(bytes: impl Into<Bytes>, limits: &ScanLimits) -> Result<Self, ScanError> {
-        read(bytes.into(), limits)
+        read(bytes.into(), limits, Budget::unlimited())
+    }
+
+    /// [`Scan::read`] within a request's budget.
+    ///
+    /// # Errors
+    /// As [`Scan::read`]; `Exhausted`.
+    pub fn read_within(
+        bytes: impl Into<Bytes>,
+        limits: &ScanLimits,
+        budget: &Budget,
+    ) -> Result<Self, ScanError> {
+        read(bytes.into(), limits, budget)
     }
 }
 
-fn read(bytes: Bytes, limits: &ScanLimits) -> Result<Scan, ScanError> {
+/// About the bytes that a parsed JSON value takes.
+const JSON_VALUE: usize = 100;
+/// Nanoseconds of work a JSON value.
+const VALUE_WORK: u64 = 150;
+
+fn read(bytes: Bytes, limits: &ScanLimits, budget: &Budget) -> Result<Scan, ScanError> {
     let layout = super::container::layout(&bytes)?;
     let text = bytes.get(layout.json.clone()).unwrap_or_default();
     let limit = Limit {
         name: "max_json_values",
         allowed: limits.max_json_values,
     };
-    limit.check(values_at_most(text), "")?;
+    let values = values_at_most(text);
+    limit.check(values, "")?;
+    budget.hold(JSON_VALUE * values)?;
+    budget.spend(VALUE_WORK * values as u64)?;
     let json = darn_json::value(text).map_err(|error| ScanError::Container {
         offset: layout.json.start + offset_of(text, error.line(), error.column()),
         detail: format!("the JSON does not parse: {error}"),
@@ -61,6 +82,7 @@ fn read(bytes: Bytes, limits: &ScanLimits) -> Result<Scan, ScanError> {
     let mut reader = ScanReader::new(&document, limits);
     let mut met = BTreeSet::new();
     for node in &nodes {
+        budget.check()?;
         reader.read_mesh(&MeshInstance {
             node,
             shared: instances.get(&node.mesh).is_some_and(|n| *n > 1),
@@ -76,14 +98,18 @@ fn read(bytes: Bytes, limits: &ScanLimits) -> Result<Scan, ScanError> {
     if surface.faces.is_empty() {
         return Err(ScanError::NoTriangles);
     }
-    Ok(Scan {
+    let json_held = json_held(&json);
+    let scan = Scan {
         surface,
         parts,
         blocks,
         bytes,
         layout,
         json,
-    })
+        json_held,
+    };
+    budget.hold(scan.decoded_bytes())?;
+    Ok(scan)
 }
 
 fn check_version(root: &JsonPlace<'_>) -> Result<(), ScanError> {
@@ -237,13 +263,31 @@ impl<'d, 'a> ScanReader<'d, 'a> {
                 == Some(&Value::Bool(true)),
             shared: instance.shared,
             first_instance: instance.first,
-            targets: place
-                .get("targets")?
-                .map_or(Ok(0), |targets| targets.array().map(<[_]>::len))?,
+            targets: self.count_targets(place)?,
             color_kinds,
             transform: node.transform.clone(),
             skinning,
         }))
+    }
+
+    /// The number of morph targets of a primitive. Each must be an object: every patch repeats their number.
+    fn count_targets(&self, place: &JsonPlace<'a>) -> Result<usize, ScanError> {
+        let Some(targets) = place.get("targets")? else {
+            return Ok(0);
+        };
+        let limit = Limit {
+            name: "max_morph_targets",
+            allowed: self.limits.max_morph_targets,
+        };
+        limit.check(targets.array()?.len(), &targets.pointer)?;
+        let mut count = 0;
+        for target in targets.items()? {
+            if !target.value.is_object() {
+                return Err(target.invalid("a morph target must be an object"));
+            }
+            count += 1;
+        }
+        Ok(count)
     }
 
     /// Decodes a POSITION accessor as a new block of vertices; returns their range in the surface.

@@ -443,6 +443,53 @@ fn limits_are_named_with_their_value() {
 }
 
 #[test]
+fn morph_targets_are_objects_and_few() {
+    let with_targets = |targets: serde_json::Value| {
+        let mut json: serde_json::Value = serde_json::from_str(TARGETS).unwrap();
+        json["meshes"][0]["primitives"][0]["targets"] = targets;
+        Scan::read(json.to_string().into_bytes(), &ScanLimits::default())
+    };
+    assert_eq!(
+        with_targets(serde_json::json!([{}, {}])).unwrap().parts[0].targets,
+        2
+    );
+    let zeros = with_targets(serde_json::json!([{}, 0])).unwrap_err();
+    assert_eq!(zeros.pointer(), Some("/meshes/0/primitives/0/targets/1"));
+    let many = with_targets(serde_json::json!(vec![serde_json::json!({}); 1025])).unwrap_err();
+    assert!(
+        many.to_string().contains("max_morph_targets = 1024"),
+        "{many}"
+    );
+}
+
+/// One triangle in a data URI.
+const TARGETS: &str = r#"{
+    "asset": {"version": "2.0"}, "nodes": [{"mesh": 0}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+    "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+    "bufferViews": [{"buffer": 0, "byteLength": 36}],
+    "buffers": [{"byteLength": 36, "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]
+}"#;
+
+#[test]
+fn memory_of_the_parsed_json_is_counted_and_not_guessed() {
+    let held = |extras: serde_json::Value| {
+        let mut json: serde_json::Value = serde_json::from_str(TARGETS).unwrap();
+        json["extras"] = extras;
+        let text = json.to_string();
+        let scan = Scan::read(text.clone().into_bytes(), &ScanLimits::default()).unwrap();
+        (scan.bytes_held(), text.len())
+    };
+    let (plain, _) = held(serde_json::json!(null));
+    let (nested, text) = held(serde_json::json!(vec![serde_json::json!([]); 10_000]));
+    // A list takes the place of a value, however short its text.
+    assert!(nested - plain >= 10_000 * size_of::<serde_json::Value>());
+    assert!(nested > 10 * text);
+    let (string, text) = held(serde_json::json!("x".repeat(100_000)));
+    assert!(string < 4 * text);
+}
+
+#[test]
 fn a_scan_that_draws_nothing_says_so() {
     assert!(matches!(
         read(&Builder::new().glb()),

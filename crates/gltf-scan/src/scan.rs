@@ -1,5 +1,6 @@
 //! A scan in memory: its geometry, and the file it was read from.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -25,6 +26,8 @@ pub struct Scan {
     pub(crate) bytes: Bytes,
     pub(crate) layout: ContainerLayout,
     pub(crate) json: Value,
+    /// Bytes of memory that the parsed JSON takes.
+    pub(crate) json_held: usize,
 }
 
 /// A triangle primitive as one node draws it.
@@ -74,6 +77,34 @@ pub(crate) struct VertexBlock {
     pub local: Vec<[f32; 3]>,
 }
 
+/// Bytes of memory that a parsed JSON value takes: its own place, and what it has allocated. Counted, since a list of empty lists takes
+/// sixty times as much as its text.
+pub(crate) fn json_held(json: &Value) -> usize {
+    // A map's entry: its key, its value, their hash, and its place in the table of the map.
+    const ENTRY: usize = size_of::<String>() + size_of::<Value>() + 2 * size_of::<usize>();
+    let (mut held, mut open) = (size_of::<Value>(), vec![json]);
+    while let Some(value) = open.pop() {
+        match value {
+            Value::Null | Value::Bool(_) => {}
+            // Numbers keep their text.
+            Value::Number(number) => held += number.as_str().len(),
+            Value::String(text) => held += text.capacity(),
+            Value::Array(items) => {
+                held += size_of::<Value>() * items.capacity();
+                open.extend(items);
+            }
+            Value::Object(members) => {
+                held += members
+                    .keys()
+                    .map(|key| ENTRY + key.capacity())
+                    .sum::<usize>();
+                open.extend(members.values());
+            }
+        }
+    }
+    held
+}
+
 impl Scan {
     /// The container it was read from; [`Scan::write`] writes the same.
     pub fn container(&self) -> Container {
@@ -82,6 +113,11 @@ impl Scan {
 
     /// Memory it holds, in bytes, estimated.
     pub fn bytes_held(&self) -> usize {
+        self.bytes.len() + self.json_held + self.decoded_bytes()
+    }
+
+    /// Memory of the decoded geometry and attributes.
+    pub(crate) fn decoded_bytes(&self) -> usize {
         let attributes = |part: &ScanPart| {
             let texcoords: usize = part.texcoords.iter().map(|set| 8 * set.len()).sum();
             let colors: usize = part.colors.iter().map(|set| 16 * set.len()).sum();
@@ -93,10 +129,7 @@ impl Scan {
         let parts: usize = self.parts.iter().map(attributes).sum();
         let surface = 24 * self.surface.positions.len() + 12 * self.surface.faces.len();
         let local: usize = self.blocks.iter().map(|b| 12 * b.local.len()).sum();
-        // A parsed data URI takes as much memory as its text, a list of small numbers ten times as much; 4 lies
-        // between.
-        let json = 4 * self.layout.json.len();
-        self.bytes.len() + json + surface + local + parts
+        surface + local + parts
     }
 
     /// The part that a face of `surface` belongs to, as an index into `parts`.
@@ -124,11 +157,14 @@ impl Scan {
             weights.as_array()
         };
         let on = |weight: &Value| weight.as_f64().is_some_and(|weight| weight != 0.0);
-        self.parts.iter().any(|part| {
+        // Once for each node and number of targets: a mesh may have thousands of primitives and of weights.
+        let drawn: BTreeSet<(usize, usize, usize)> =
+            (self.parts.iter().map(|p| (p.node, p.mesh, p.targets))).collect();
+        drawn.into_iter().any(|(node, mesh, targets)| {
             // A node's weights replace its mesh's (glTF 2.0, 3.7.2.2).
-            weights("nodes", part.node)
-                .or_else(|| weights("meshes", part.mesh))
-                .is_some_and(|weights| weights.iter().take(part.targets).any(on))
+            weights("nodes", node)
+                .or_else(|| weights("meshes", mesh))
+                .is_some_and(|weights| weights.iter().take(targets).any(on))
         })
     }
 

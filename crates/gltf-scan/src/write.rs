@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use darn_budget::Budget;
 use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::mesh::TRIANGLES;
 use serde_json::{Map, Value, json};
@@ -30,6 +31,18 @@ impl Scan {
     /// [`ScanError::InvalidPatch`] for a patch that contradicts itself or the scan, [`ScanError::Singular`] for one on
     /// a node whose transform is singular.
     pub fn write(&self, patches: &[PatchPrimitive]) -> Result<Vec<u8>, ScanError> {
+        self.write_within(patches, Budget::unlimited())
+    }
+
+    /// [`Scan::write`] within a request's budget.
+    ///
+    /// # Errors
+    /// As [`Scan::write`]; `Exhausted`.
+    pub fn write_within(
+        &self,
+        patches: &[PatchPrimitive],
+        budget: &Budget,
+    ) -> Result<Vec<u8>, ScanError> {
         if patches.is_empty() {
             return Ok(self.bytes.to_vec());
         }
@@ -37,6 +50,8 @@ impl Scan {
         let mut materials = HashMap::new();
         for (index, patch) in patches.iter().enumerate() {
             let checked = CheckedPatch::new(self, patch, index)?;
+            budget.hold(TARGET * checked.home.targets)?;
+            budget.spend(TARGET_WORK * checked.home.targets as u64)?;
             let material = match checked.look.material {
                 Some(source) => Some(match materials.get(&source) {
                     Some(copy) => *copy,
@@ -54,9 +69,15 @@ impl Scan {
                 out.primitive(checked.home.mesh, primitive);
             }
         }
+        budget.check_output(self.bytes.len() + out.appended_bytes())?;
         out.finish()
     }
 }
+
+/// Bytes of memory of a morph target of a patch, as JSON and as text.
+const TARGET: usize = 300;
+/// Nanoseconds of work a morph target of a patch.
+const TARGET_WORK: u64 = 300;
 
 /// Appends a copy of a material that is marked as a reconstruction, and returns its index. A material that has the mark
 /// is used as it is.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use darn_budget::{Budget, Exhausted};
 use serde_json::json;
 
 use crate::VERSION;
@@ -16,14 +17,35 @@ use darn_geometry::patch::{Patch, quality};
 use darn_gltf_scan::{PatchPoint, PatchPrimitive, Scan, ScanPart};
 use darn_net::WeightsCard;
 
-/// The patch of a filled hole as a primitive of the part that most of its rim belongs to; `card` is that of the network
-/// that filled it.
-pub fn addition(
-    scan: &Scan,
-    welded: &WeldedScan,
-    filled: &FilledHole,
-    card: &WeightsCard,
-) -> PatchPrimitive {
+/// Where patches get their attributes and their provenance from.
+pub struct PatchSource<'a> {
+    /// The scan.
+    pub scan: &'a Scan,
+    /// Its welded surface.
+    pub welded: &'a WeldedScan,
+    /// The card of the network that filled the holes.
+    pub card: &'a WeightsCard,
+    /// What the patches may cost.
+    pub budget: &'a Budget<'a>,
+}
+
+impl PatchSource<'_> {
+    /// The patch of a filled hole as a primitive of the part that most of its rim belongs to.
+    ///
+    /// # Errors
+    /// `Exhausted`.
+    pub fn addition(&self, filled: &FilledHole) -> Result<PatchPrimitive, Exhausted> {
+        addition(self, filled)
+    }
+}
+
+fn addition(source: &PatchSource, filled: &FilledHole) -> Result<PatchPrimitive, Exhausted> {
+    let PatchSource {
+        scan,
+        welded,
+        card,
+        budget,
+    } = *source;
     let FilledHole {
         hole,
         patch,
@@ -74,11 +96,14 @@ pub fn addition(
         any: &any,
         values: &values,
         width,
+        budget,
     };
     let (dressed, normals) = rayon::join(
         || extend_attributes(&hole.plan, patch, region, chart, &columns),
         || normals(patch, region),
     );
+    let dressed = dressed?;
+    budget.hold(patch_bytes(dressed.corners.len(), width))?;
     let points = dressed.corners.iter().map(|c| match c.scan {
         Some(s) => PatchPoint::Scan(s),
         None => PatchPoint::New(patch.positions[c.vertex as usize]),
@@ -107,7 +132,7 @@ pub fn addition(
             .map(|n| [0, 1, 2, 3].map(|k: usize| rgba[k][n]))
             .collect()
     });
-    PatchPrimitive {
+    Ok(PatchPrimitive {
         part,
         material_of: part,
         points: points.collect(),
@@ -122,7 +147,12 @@ pub fn addition(
         colors: colors.collect(),
         name: format!("darn reconstruction of hole {}", report.id),
         extras: provenance(report, card),
-    }
+    })
+}
+
+/// Bytes of memory of a patch: as columns, as a primitive, and in the answer.
+fn patch_bytes(vertices: usize, columns: usize) -> usize {
+    vertices * (3 * 24 + 8 * columns + 2 * (24 + 4 * columns + 12) + 60)
 }
 
 /// Whether most triangles of a region have a twin that shows their other side.

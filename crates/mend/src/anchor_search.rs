@@ -9,9 +9,8 @@ use crate::edit::{
 };
 use crate::error::MendError;
 use crate::inpainter::Inpainter;
-use crate::mender::check_cancelled;
 use crate::timings::milliseconds;
-use darn_contract::port::Cancellation;
+use darn_budget::Budget;
 use darn_contract::{FieldError, Search, v1};
 use darn_geometry::grid::{CELLS, SIDE, cell_centre};
 use darn_geometry::mesh::{Vec2, Vec3};
@@ -21,21 +20,22 @@ use darn_net::{AnchorLoss, AnchorProblem};
 /// network computes in f32.
 const FAR: f64 = 100.0;
 
+/// Nanoseconds of work of the network a cell.
+const LOSS_WORK: u64 = 4_000_000;
+/// The same with the gradient.
+const GRADIENT_WORK: u64 = 10_000_000;
+
 /// The network's loss of an anchor at a target, for each cell.
 struct AnchorLosses<'a> {
     inpainter: &'a Inpainter<'a>,
     problem: AnchorProblem,
     /// How far the target was moved towards the hole, scene units.
     moved_in: f64,
-    cancellation: Cancellation<'a>,
+    budget: &'a Budget<'a>,
 }
 
 impl<'a> AnchorLosses<'a> {
-    fn new(
-        context: &'a HoleContext<'a>,
-        target: Vec3,
-        cancellation: Cancellation<'a>,
-    ) -> Result<AnchorLosses<'a>, MendError> {
+    fn new(context: &'a HoleContext<'a>, target: Vec3) -> Result<AnchorLosses<'a>, MendError> {
         let hole = context.hole;
         let centre = hole.normal.centre;
         let near = centre + (target - centre).cap_magnitude(FAR * hole.extent());
@@ -45,7 +45,7 @@ impl<'a> AnchorLosses<'a> {
             moved_in: (target - near).norm(),
             problem: inpainter.anchor_problem(&hole.normal_grid(), target_at)?,
             inpainter,
-            cancellation,
+            budget: context.budget,
         })
     }
 }
@@ -54,13 +54,13 @@ impl LossField for AnchorLosses<'_> {
     type Error = MendError;
 
     fn losses(&self, cells: &[usize]) -> Result<Vec<f64>, MendError> {
-        check_cancelled(self.cancellation)?;
+        self.budget.spend(LOSS_WORK * cells.len() as u64)?;
         let losses = self.inpainter.losses(&self.problem, &uvs(cells))?;
         Ok(losses.into_iter().map(f64::from).collect())
     }
 
     fn gradients(&self, cells: &[usize]) -> Result<Vec<CellLoss>, MendError> {
-        check_cancelled(self.cancellation)?;
+        self.budget.spend(GRADIENT_WORK * cells.len() as u64)?;
         let losses = self.inpainter.gradients(&self.problem, &uvs(cells))?;
         let cell_loss = |at: AnchorLoss| CellLoss {
             loss: at.loss.into(),
@@ -81,7 +81,7 @@ impl HoleContext<'_> {
     /// # Errors
     /// `NoCells` when no cell lies in the hole; a failure of the network.
     pub fn place_anchor(&self, position: Vec3) -> Result<Vec2, MendError> {
-        let losses = AnchorLosses::new(self, position, Cancellation::NEVER)?;
+        let losses = AnchorLosses::new(self, position)?;
         let first = (self.cell_near(position)).ok_or_else(|| self.no_cells())?;
         Ok(cell_centre(self.descend(&losses, first)?.cell))
     }
@@ -90,16 +90,12 @@ impl HoleContext<'_> {
     ///
     /// # Errors
     /// At `/start` when that does not lie in the hole; `NoCells` when no cell does; a failure of the network;
-    /// `Abandoned`.
-    pub fn search(
-        &self,
-        search: &Search,
-        cancellation: Cancellation,
-    ) -> Result<v1::AnchorFound, MendError> {
+    /// `Exhausted`.
+    pub fn search(&self, search: &Search) -> Result<v1::AnchorFound, MendError> {
         let started = Instant::now();
         let hole = self.hole;
         let target = Vec3::from(search.target);
-        let losses = AnchorLosses::new(self, target, cancellation)?;
+        let losses = AnchorLosses::new(self, target)?;
         let first = match search.start {
             None => self.cell_near(target),
             Some(uv) if hole.contains(uv.into()) => nearest_cell(&hole.cells, uv.into()),

@@ -15,6 +15,16 @@ use darn_geometry::patch::{Firmness, Patch, Pull};
 /// A hard anchor is met when the cloth is nearer to it than this share of the hole's extent.
 const MET: f64 = 1e-3;
 
+/// Most points that anchors and gestures may move on one hole. Their forces are solved for together, by a dense system that cannot be
+/// interrupted: this many take a third of a second.
+const MAX_POINTS: usize = 1024;
+/// Nanoseconds of work a face of the patch in the search for the place of a point.
+const FACE_WORK: u64 = 5;
+/// Nanoseconds of work of bringing a point within reach.
+const REACH_WORK: u64 = 400_000;
+/// Nanoseconds of work of a gesture: the displacements of all cells before it.
+const GESTURE_WORK: u64 = 5_000_000;
+
 /// What the cloth of a hole should do.
 pub struct HoleConstraints<'a> {
     hole: &'a Hole,
@@ -43,7 +53,9 @@ impl<'a> HoleContext<'a> {
     /// reach; whatever [`HoleContext::place_anchor`] fails with.
     pub fn constraints(&self, request: &HoleRequest) -> Result<HoleConstraints<'a>, MendError> {
         let hole = self.hole;
+        check_count(hole, request.anchors.len())?;
         check_uvs(hole, request)?;
+        let place_work = FACE_WORK * self.unedited.patch.faces.len() as u64;
         let position = |flat: Vec2| self.unedited.patch.at(flat);
         let surface = ClothSurface {
             square: hole.chart.frame,
@@ -51,6 +63,7 @@ impl<'a> HoleContext<'a> {
         };
         let mut anchors = Vec::new();
         for Entry { value: anchor, .. } in &request.anchors {
+            self.budget.spend(place_work)?;
             let target = Vec3::from(anchor.position);
             let uv = match anchor.uv {
                 Some(uv) => uv.into(),
@@ -63,14 +76,19 @@ impl<'a> HoleContext<'a> {
             anchors.push(surface.point(uv, target, firmness));
         }
         let mut asked = targets(&anchors);
+        self.budget.spend(REACH_WORK * anchors.len() as u64)?;
         bring_within_reach(hole, &mut anchors);
         let mut placed = PlacedPoints::new(&hole.cells, surface, anchors);
-        let edits: Vec<Vec<usize>> = (request.edits.iter())
-            .map(|edit| placed.apply(&edit.value.gesture))
-            .collect();
+        let mut edits: Vec<Vec<usize>> = Vec::with_capacity(request.edits.len());
+        for edit in &request.edits {
+            self.budget.spend(GESTURE_WORK + place_work)?;
+            edits.push(placed.apply(&edit.value.gesture));
+        }
         let mut points = placed.points().to_vec();
         asked.extend(targets(&points).into_iter().skip(asked.len()));
+        check_count(hole, points.len())?;
         if !edits.is_empty() {
+            self.budget.spend(REACH_WORK * points.len() as u64)?;
             bring_within_reach(hole, &mut points);
         }
         let constraints = HoleConstraints {
@@ -202,6 +220,19 @@ fn bring_within_reach(hole: &Hole, points: &mut [PlacedPoint]) {
     }
 }
 
+/// Checks how many points a request moves on a hole.
+fn check_count(hole: &Hole, points: usize) -> Result<(), MendError> {
+    if points <= MAX_POINTS {
+        return Ok(());
+    }
+    let detail = format!(
+        "anchors and gestures move {points} points of hole {}; at most {MAX_POINTS} can be moved at once",
+        hole.id
+    );
+    let wrong = FieldError::new("", detail);
+    Err(MendError::Constraints(vec![wrong]))
+}
+
 /// Checks that every uv of a request lies in the hole.
 fn check_uvs(hole: &Hole, request: &HoleRequest) -> Result<(), MendError> {
     let mut wrong = Vec::new();
@@ -235,6 +266,8 @@ fn check_uvs(hole: &Hole, request: &HoleRequest) -> Result<(), MendError> {
 
 #[cfg(test)]
 mod tests {
+    use darn_budget::Budget;
+
     use super::*;
     use crate::testing::{BEST_UV, context, request};
     use proptest::prelude::*;
@@ -293,6 +326,29 @@ mod tests {
         assert_eq!(moves[0].by, Vec3::zeros());
         assert_eq!(moves[0].cell, grid::cell_at(MIDDLE.into()));
         assert_eq!(constraints.pulls()[0].to, cloth_at(&context, MIDDLE));
+    }
+
+    #[test]
+    fn anchors_without_uv_ask_the_budget() {
+        let left = Budget::new(darn_budget::Limits::default(), &|| true);
+        let context = HoleContext {
+            budget: &left,
+            ..context()
+        };
+        let free = Anchor {
+            uv: None,
+            ..soft(&context, MIDDLE, Vec3::zeros())
+        };
+        let refused = context.constraints(&request(&[free], &[])).err();
+        assert!(matches!(refused, Some(MendError::Exhausted(_))));
+    }
+
+    #[test]
+    fn points_beyond_what_is_solved_for_at_once_are_refused() {
+        let context = context();
+        let many = vec![soft(&context, MIDDLE, Vec3::zeros()); MAX_POINTS + 1];
+        let (code, _) = pointers(context.constraints(&request(&many, &[])));
+        assert_eq!(code, "constraints_do_not_fit");
     }
 
     #[test]

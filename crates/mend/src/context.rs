@@ -3,10 +3,13 @@
 
 use std::sync::Arc;
 
+use darn_budget::Budget;
+
 use crate::error::MendError;
 use crate::hole::{Hole, UneditedCloth};
 use crate::inpainter::Inpainter;
 use crate::limits::MendLimits;
+use crate::mender::Call;
 
 /// A hole, its cloth without constraints, and what fills it.
 pub struct HoleContext<'a> {
@@ -18,6 +21,8 @@ pub struct HoleContext<'a> {
     pub inpainter: Inpainter<'a>,
     /// The limits and options.
     pub limits: &'a MendLimits,
+    /// What filling it may cost.
+    pub budget: &'a Budget<'a>,
 }
 
 impl<'a> HoleContext<'a> {
@@ -28,13 +33,14 @@ impl<'a> HoleContext<'a> {
     pub fn new(
         hole: &'a Hole,
         inpainter: &Inpainter<'a>,
-        limits: &'a MendLimits,
+        call: Call<'a>,
     ) -> Result<HoleContext<'a>, MendError> {
         Ok(HoleContext {
             hole,
-            unedited: hole.unedited(inpainter, limits)?,
+            unedited: hole.unedited(inpainter, call)?,
             inpainter: inpainter.clone(),
-            limits,
+            limits: &call.mender.limits,
+            budget: call.budget,
         })
     }
 }

@@ -1,5 +1,6 @@
 //! Why a scan could not be mended, and the code of each reason: a stable word for programs.
 
+use darn_budget::Exhausted;
 use darn_contract::{Code, FieldError, codes, v1};
 use darn_geometry::flatten::FlattenError;
 use darn_geometry::mesh::region::RegionError;
@@ -88,16 +89,57 @@ pub enum MendError {
     Net(#[from] NetError),
     /// The patches could not be written.
     #[error("the patches could not be written: {0}")]
-    Scan(#[from] ScanError),
-    /// Nobody waits for the answer any more.
-    #[error("nobody waits for the answer any more")]
-    Abandoned,
+    Scan(ScanError),
+    /// The request's budget is exhausted, or nobody waits for the answer any more.
+    #[error(transparent)]
+    Exhausted(#[from] Exhausted),
     /// A picture could not be encoded.
     #[error("a picture could not be encoded: {0}")]
     Picture(image::ImageError),
 }
 
+impl From<ScanError> for MendError {
+    fn from(error: ScanError) -> MendError {
+        match error {
+            ScanError::Exhausted(exhausted) => MendError::Exhausted(exhausted),
+            error => MendError::Scan(error),
+        }
+    }
+}
+
 impl MendError {
+    /// The error of a scan that could not be read.
+    pub fn unreadable(error: ScanError) -> MendError {
+        match error {
+            ScanError::Exhausted(exhausted) => MendError::Exhausted(exhausted),
+            error => MendError::Unreadable(error),
+        }
+    }
+
+    /// The error of a hole without a region.
+    pub fn region(hole: u32) -> impl Fn(RegionError) -> MendError {
+        move |source| match source {
+            RegionError::Exhausted(exhausted) => MendError::Exhausted(exhausted),
+            source => MendError::Region { hole, source },
+        }
+    }
+
+    /// The error of a hole whose region cannot be laid flat.
+    pub fn flatten(hole: u32) -> impl Fn(FlattenError) -> MendError {
+        move |source| match source {
+            FlattenError::Exhausted(exhausted) => MendError::Exhausted(exhausted),
+            source => MendError::Flatten { hole, source },
+        }
+    }
+
+    /// The error of a hole that cannot be meshed.
+    pub fn patch(hole: u32) -> impl Fn(PatchError) -> MendError {
+        move |source| match source {
+            PatchError::Exhausted(exhausted) => MendError::Exhausted(exhausted),
+            source => MendError::Patch { hole, source },
+        }
+    }
+
     /// The error's row in the table of codes. This is the only place that gives errors of mending their codes.
     pub fn code(&self) -> Code {
         match self {
@@ -111,7 +153,7 @@ impl MendError {
                 ScanError::Limit { .. } => codes::SCAN_TOO_LARGE,
                 ScanError::NoTriangles => codes::NO_TRIANGLES,
                 ScanError::Singular { .. } => codes::SINGULAR_TRANSFORM,
-                ScanError::InvalidPatch { .. } => codes::INTERNAL,
+                ScanError::InvalidPatch { .. } | ScanError::Exhausted(_) => codes::INTERNAL,
             },
             MendError::Constraints(_) => codes::CONSTRAINTS_DO_NOT_FIT,
             MendError::OutOfReach(_) => codes::ANCHOR_OUT_OF_REACH,
@@ -132,10 +174,14 @@ impl MendError {
             MendError::Patch { .. } => codes::PATCH_DEGENERATE,
             MendError::Scan(ScanError::Singular { .. }) => codes::SINGULAR_TRANSFORM,
             MendError::NoCells { .. } => codes::HOLE_TOO_NARROW,
-            MendError::Net(_)
-            | MendError::Scan(_)
-            | MendError::Picture(_)
-            | MendError::Abandoned => codes::INTERNAL,
+            MendError::Exhausted(exhausted) => match exhausted {
+                Exhausted::Work { .. } => codes::TOO_MUCH_WORK,
+                Exhausted::Memory { .. } => codes::TOO_MUCH_MEMORY,
+                Exhausted::MemoryFull { .. } => codes::MEMORY_FULL,
+                Exhausted::Output { .. } => codes::ANSWER_TOO_LARGE,
+                Exhausted::Cancelled => codes::INTERNAL,
+            },
+            MendError::Net(_) | MendError::Scan(_) | MendError::Picture(_) => codes::INTERNAL,
         }
     }
 

@@ -10,7 +10,7 @@ use crate::select::HoleRequest;
 use crate::timings::milliseconds;
 use darn_contract::v1;
 use darn_geometry::mesh::Vec3;
-use darn_geometry::patch::{Patch, Pull, quality, stretch_limit};
+use darn_geometry::patch::{Patch, PatchWork, Pull, quality, stretch_limit};
 
 /// How often a smaller share of the network's movement is tried before the pulls alone move the unedited cloth.
 const MAX_TRIES: usize = 2;
@@ -67,17 +67,21 @@ impl<'a> HoleContext<'a> {
         let stretch = |patch: &Patch| quality::measure(patch, &hole.region).stretch_max;
         let usual = stretch(&unedited.patch);
         let most = stretch_limit(usual);
+        let work = PatchWork {
+            options: &self.limits.patch,
+            budget: self.budget,
+        };
         let mut share = 1.0;
         for _ in 0..MAX_TRIES {
             let each = unedited.filled.iter().zip(moved);
             let filled: Vec<Vec3> = each.map(|(from, to)| from.lerp(to, share)).collect();
-            let patch = hole.patch(&filled, pulls, self.limits)?;
+            let patch = hole.patch(&filled, pulls, work)?;
             let found = stretch(&patch);
             if found <= most {
                 return Ok(patch);
             }
             share *= (most - usual) / (found - usual);
         }
-        hole.patch(&unedited.filled, pulls, self.limits)
+        hole.patch(&unedited.filled, pulls, work)
     }
 }

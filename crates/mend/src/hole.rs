@@ -6,19 +6,22 @@ use std::time::Instant;
 use crate::edit::{HoleCells, ReachLimit};
 use crate::error::MendError;
 use crate::inpainter::{FillKey, Inpainter};
-use crate::limits::MendLimits;
+use crate::mender::Call;
 use crate::timings::milliseconds;
 use darn_contract::v1;
 use darn_geometry::flatten::Chart;
 use darn_geometry::grid::{self, CELLS, Grid, NormalGrid, Normalisation};
 use darn_geometry::mesh::region::Region;
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
-use darn_geometry::patch::{Patch, PatchPlan, Pull};
+use darn_geometry::patch::{Patch, PatchPlan, PatchWork, Pull};
 use darn_geometry::polygon;
 use darn_net::Averaging;
 
 /// Unedited cloths that a hole keeps, one for each network and up direction; a session rarely asks for a second.
 const MAX_UNEDITED: usize = 4;
+
+/// Nanoseconds of work of the network for one hole.
+const FILL_WORK: u64 = 20_000_000;
 
 /// A hole ready to be filled.
 pub struct Hole {
@@ -101,25 +104,26 @@ impl Hole {
     pub fn unedited(
         &self,
         inpainter: &Inpainter,
-        limits: &MendLimits,
+        call: Call,
     ) -> Result<Arc<UneditedCloth>, MendError> {
         if let Some(kept) = self.unedited.get(inpainter.key()) {
             return Ok(kept);
         }
-        let cloth = Arc::new(self.fill(inpainter, limits)?);
+        let cloth = Arc::new(self.fill(inpainter, call)?);
         self.unedited.keep(inpainter.key().clone(), &cloth);
         Ok(cloth)
     }
 
-    fn fill(&self, inpainter: &Inpainter, limits: &MendLimits) -> Result<UneditedCloth, MendError> {
+    fn fill(&self, inpainter: &Inpainter, call: Call) -> Result<UneditedCloth, MendError> {
         let started = Instant::now();
+        call.budget.spend(FILL_WORK)?;
         let answers =
             inpainter.fill(std::slice::from_ref(&self.normal_grid()), Averaging::Flips)?;
         let predicted = self.in_scene(answers.first().map_or(&[], Vec::as_slice));
         let net_ms = milliseconds(started);
         let started = Instant::now();
         let filled = self.filled(&predicted);
-        let patch = self.patch(&filled, &[], limits)?;
+        let patch = self.patch(&filled, &[], call.into())?;
         Ok(UneditedCloth {
             predicted,
             filled,
@@ -152,14 +156,11 @@ impl Hole {
         &self,
         filled: &[Vec3],
         pulls: &[Pull],
-        limits: &MendLimits,
+        work: PatchWork,
     ) -> Result<Patch, MendError> {
         self.plan
-            .patch(&self.chart, filled, pulls, &limits.patch)
-            .map_err(|source| MendError::Patch {
-                hole: self.id,
-                source,
-            })
+            .patch(&self.chart, filled, pulls, work)
+            .map_err(MendError::patch(self.id))
     }
 
     /// Bytes of memory that it holds, estimated.

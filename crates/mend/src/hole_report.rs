@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use darn_budget::{Budget, Exhausted, Steps};
 use rstar::{PointDistance as _, RTree};
 
 use crate::error::MendError;
@@ -20,6 +21,11 @@ const SUSPICIOUS: f64 = 1.5;
 /// A loose piece lies in the hole when all of its border is nearer to the patch than this many edges of the hole's rim.
 const IN_THE_HOLE: f64 = 1.5;
 
+/// Most loose pieces that a note names.
+const MAX_NAMED: usize = 20;
+/// Nanoseconds of work a search for the nearest vertex of a patch.
+const NEAREST_WORK: u64 = 300;
+
 /// A hole's patch and its report.
 pub struct FilledHole<'a> {
     /// The hole.
@@ -35,7 +41,11 @@ impl<'a> PatchDraft<'a> {
     ///
     /// # Errors
     /// `OutOfReach` for hard anchors that it does not meet.
-    pub fn measured(self, welded: &WeldedScan) -> Result<FilledHole<'a>, MendError> {
+    pub fn measured(
+        self,
+        welded: &WeldedScan,
+        budget: &Budget,
+    ) -> Result<FilledHole<'a>, MendError> {
         let PatchDraft {
             hole,
             patch,
@@ -48,7 +58,7 @@ impl<'a> PatchDraft<'a> {
         let quality = quality::measure(&patch, &hole.region);
         timings.report = milliseconds(started);
         let mut notes = notes(hole, &quality);
-        notes.extend(loose_pieces_note(hole, &patch, welded));
+        notes.extend(loose_pieces_note(hole, &patch, welded, budget)?);
         notes.extend(constraints.notes(&kept.anchors));
         let rim = &welded.loops[hole.id as usize];
         let report = v1::HoleReport {
@@ -103,12 +113,22 @@ fn patch_report(patch: &Patch, quality: &Quality) -> v1::PatchReport {
 
 /// A note on loose pieces of the scan that lie where the patch is. The chart does not contain them, as they are not
 /// connected to the cloth around the hole.
-fn loose_pieces_note(hole: &Hole, patch: &Patch, welded: &WeldedScan) -> Option<String> {
+///
+/// # Errors
+/// `Exhausted`: every other piece is looked at for every hole.
+fn loose_pieces_note(
+    hole: &Hole,
+    patch: &Patch,
+    welded: &WeldedScan,
+    budget: &Budget,
+) -> Result<Option<String>, Exhausted> {
     let rim = &welded.loops[hole.id as usize];
     let others =
         (welded.loops.iter()).filter(|l| l.kind == LoopKind::Outer && l.component != rim.component);
     let mut others = others.peekable();
-    others.peek()?;
+    if others.peek().is_none() {
+        return Ok(None);
+    }
     let near = IN_THE_HOLE * rim.length / rim.vertices.len().max(1) as f64;
     let tree = RTree::bulk_load(
         patch
@@ -122,14 +142,28 @@ fn loose_pieces_note(hole: &Hole, patch: &Patch, welded: &WeldedScan) -> Option<
         let nearest = tree.nearest_neighbor(&place);
         nearest.is_some_and(|p| p.distance_2(&place) <= near * near)
     };
-    let inside = others.filter(|l| l.vertices.iter().all(is_near));
-    let pieces: Vec<String> = inside.map(|l| l.id.to_string()).collect();
-    (!pieces.is_empty()).then(|| {
-        format!(
-            "loose piece(s) of the scan lie in the hole (their borders: loop {}); they were kept, and the new cloth covers their place, too",
-            pieces.join(", ")
-        )
-    })
+    let mut steps = Steps::of(budget);
+    let mut pieces: Vec<String> = Vec::new();
+    for piece in others {
+        let near = (piece.vertices.iter().take_while(|v| is_near(v))).count();
+        steps.take(NEAREST_WORK * (near as u64 + 1))?;
+        if near == piece.vertices.len() {
+            pieces.push(piece.id.to_string());
+        }
+    }
+    if pieces.is_empty() {
+        return Ok(None);
+    }
+    let more = pieces.len().saturating_sub(MAX_NAMED);
+    pieces.truncate(MAX_NAMED);
+    let more = match more {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    Ok(Some(format!(
+        "loose piece(s) of the scan lie in the hole (their borders: loop {}{more}); they were kept, and the new cloth covers their place, too",
+        pieces.join(", ")
+    )))
 }
 
 /// What a person should look at before trusting the patch.

@@ -13,6 +13,7 @@
 
 mod addition;
 mod anchor_search;
+mod call_pools;
 mod constraints;
 mod context;
 mod edit;
@@ -38,10 +39,12 @@ mod welded_scan;
 
 use std::time::Instant;
 
+use darn_budget::Budget;
 use darn_contract::port::Mended;
 use darn_contract::{Anchor, Constraints, Search, v1};
 use darn_gltf_scan::Scan;
 
+pub use call_pools::CallPools;
 pub use edit::SearchOptions;
 pub use error::MendError;
 pub use limits::{EditedFill, MendLimits};
@@ -61,8 +64,7 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// end of a tube.
 ///
 /// # Errors
-/// A constraint that does not fit the scan, a chosen hole that cannot be filled, no hole at all; `Abandoned` when the
-/// call is cancelled.
+/// A constraint that does not fit the scan, a chosen hole that cannot be filled, no hole at all; `Exhausted`.
 pub fn mend<'a>(
     scan: &Scan,
     constraints: &Constraints,
@@ -70,15 +72,14 @@ pub fn mend<'a>(
 ) -> Result<Mended, MendError> {
     let call = call.into();
     let holes = ScanHoles::open(scan, constraints, call)?;
-    holes.mended(scan, holes.filled(call)?)
+    holes.mended(scan, holes.filled(call)?, call)
 }
 
 /// Searches where on a hole's grid a point in space belongs: the cell where an anchor at that point brings the cloth
 /// nearest to it.
 ///
 /// # Errors
-/// A hole that does not exist or cannot be laid flat, several holes of which the search names none; `Abandoned` when
-/// the call is cancelled.
+/// A hole that does not exist or cannot be laid flat, several holes of which the search names none; `Exhausted`.
 pub fn optimize_anchor<'a>(
     scan: &Scan,
     search: &Search,
@@ -101,7 +102,7 @@ pub fn mend_to_target<'a>(
     let holes = ScanHoles::open(scan, &Constraints::default(), call)?;
     let found = holes.search(search, call)?;
     let filled = holes.filled_with(scan, &anchor_of(&found, search), call)?;
-    holes.mended(scan, filled)
+    holes.mended(scan, filled, call)
 }
 
 /// The result of a search as constraints: one soft anchor at the search's target.
@@ -119,12 +120,20 @@ pub fn anchor_of(found: &v1::AnchorFound, search: &Search) -> Constraints {
 }
 
 /// Every boundary loop of a scan, with its kind and size.
-pub fn find_holes(scan: &Scan) -> v1::HolesReport {
+///
+/// # Errors
+/// `Exhausted`.
+pub fn find_holes(scan: &Scan, budget: &Budget) -> Result<v1::HolesReport, MendError> {
     let started = Instant::now();
-    let welded = WeldedScan::of(scan);
-    let loops = welded.loops.iter();
-    v1::HolesReport {
-        loops: loops.map(|l| welded.loop_report(l, scan)).collect(),
+    let welded = WeldedScan::of(scan, budget)?;
+    budget.hold(LOOP_REPORT * welded.loops.len())?;
+    let mut loops = Vec::with_capacity(welded.loops.len());
+    for rim in &welded.loops {
+        budget.spend(LOOP_WORK)?;
+        loops.push(welded.loop_report(rim, scan));
+    }
+    Ok(v1::HolesReport {
+        loops,
         components: welded.topology.components as u32,
         vertices: welded.surface.mesh.positions.len() as u32,
         faces: welded.surface.mesh.faces.len() as u32,
@@ -133,5 +142,117 @@ pub fn find_holes(scan: &Scan) -> v1::HolesReport {
             total: milliseconds(started),
             ..welded.timings
         }),
+    })
+}
+
+/// Bytes of memory of a loop in a report, and of its JSON.
+const LOOP_REPORT: usize = 1000;
+/// Nanoseconds of work a loop in a report, and its JSON.
+const LOOP_WORK: u64 = 3000;
+
+#[cfg(test)]
+mod tests {
+    use darn_budget::{Exhausted, Limits};
+    use darn_geometry::mesh::shapes::{jitter, sheet};
+    use darn_geometry::mesh::{TriMesh, Vec3};
+
+    use super::*;
+    use crate::testing::{mender, scan_of};
+
+    /// A sheet with a hole whose vertices lie anywhere: every triangle crosses every other.
+    fn tangle(n: usize) -> TriMesh {
+        let keep = |u: f64, v: f64| (u - 0.5).hypot(v - 0.5) > 0.3;
+        jitter(&sheet(n, keep, |u, v| Vec3::new(u, v, 0.0)), 100.0, 1)
+    }
+
+    /// Work in nanoseconds until the scan is mended or refused.
+    fn work(scan: &Scan, limit: u64) -> (u64, Option<MendError>) {
+        let limits = Limits {
+            work: limit,
+            ..Limits::default()
+        };
+        let budget = Budget::new(limits, &|| false);
+        let call = Call {
+            mender: mender(),
+            budget: &budget,
+        };
+        let error = mend(scan, &Constraints::default(), call).err();
+        (budget.spent(), error)
+    }
+
+    #[test]
+    fn a_tangle_costs_no_more_than_its_size_allows() {
+        for n in [16, 32] {
+            let scan = scan_of(&tangle(n));
+            let holes = find_holes(&scan, Budget::unlimited()).unwrap();
+            assert!(!holes.loops.is_empty());
+            // 36 bytes a vertex of positions and normals are more than the file has.
+            let bytes = 36 * scan.surface.positions.len() as u64;
+            let (spent, _) = work(&scan, u64::MAX - 1);
+            assert!(
+                spent < 2_000_000_000.max(50_000 * bytes),
+                "{n}: {spent} ns for {bytes} bytes"
+            );
+        }
+    }
+
+    #[test]
+    fn work_beyond_the_limit_is_refused_by_name_every_time_alike() {
+        let scan = scan_of(&tangle(16));
+        let (all, _) = work(&scan, u64::MAX - 1);
+        let (_, error) = work(&scan, all / 2);
+        let error = error.expect("a refusal");
+        assert!(matches!(
+            error,
+            MendError::Exhausted(Exhausted::Work { .. })
+        ));
+        assert_eq!(error.code(), darn_contract::codes::TOO_MUCH_WORK);
+        assert_eq!(work(&scan, u64::MAX - 1).0, all);
+    }
+
+    #[test]
+    fn holes_take_memory_within_the_limit_or_are_refused() {
+        let keep = |u: f64, v: f64| {
+            let near = |x: f64| (x * 4.0).fract() - 0.5;
+            near(u).hypot(near(v)) > 0.2
+        };
+        let scan = scan_of(&sheet(60, keep, |u, v| Vec3::new(u, v, 0.0)));
+        let limits = Limits {
+            memory: 4 << 20,
+            ..Limits::default()
+        };
+        let budget = Budget::new(limits, &|| false);
+        let call = Call {
+            mender: mender(),
+            budget: &budget,
+        };
+        let error = mend(&scan, &Constraints::default(), call).unwrap_err();
+        assert_eq!(
+            error.code(),
+            darn_contract::codes::TOO_MUCH_MEMORY,
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_report_repeats_no_long_name_for_every_loop() {
+        let mesh = sheet(
+            12,
+            |u, v| (u - 0.5).hypot(v - 0.5) > 0.2,
+            |u, v| Vec3::new(u, v, 0.0),
+        );
+        let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|p| p.cast().into()).collect();
+        let named = darn_gltf_scan::export::NewMesh {
+            name: &"x".repeat(100_000),
+            positions: &positions,
+            normals: &vec![[0.0, 0.0, 1.0]; positions.len()],
+            texcoords: &[],
+            faces: &mesh.faces,
+        };
+        let bytes = darn_gltf_scan::export::glb(&named).unwrap();
+        let scan = Scan::read(bytes, &Default::default()).unwrap();
+        let report = find_holes(&scan, Budget::unlimited()).unwrap();
+        assert_eq!(report.loops.len(), 2);
+        assert!(report.loops.iter().all(|l| l.mesh.len() < 300));
     }
 }

@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use darn_contract::port::Cancellation;
+use darn_budget::Budget;
+use darn_geometry::patch::PatchWork;
 use darn_gltf_scan::ScanLimits;
 use darn_net::Networks;
 
-use crate::error::MendError;
+use crate::call_pools::CallPools;
 use crate::limits::MendLimits;
 
 /// The loaded networks, and the limits of a mend.
@@ -18,6 +19,8 @@ pub struct NetworkMender {
     pub limits: MendLimits,
     /// The limits of reading a scan.
     pub scan_limits: ScanLimits,
+    /// The threads of calls that come through the port.
+    pub pools: CallPools,
 }
 
 impl NetworkMender {
@@ -27,24 +30,34 @@ impl NetworkMender {
             networks,
             limits: MendLimits::default(),
             scan_limits: ScanLimits::default(),
+            pools: CallPools::default(),
         }
     }
 }
 
-/// A mender and its caller's cancellation check. A call made from a [`NetworkMender`] alone is never cancelled.
+/// A mender and what the call to it may cost. A call made from a [`NetworkMender`] alone has no limits.
 #[derive(Debug, Clone, Copy)]
 pub struct Call<'a> {
     /// The networks and limits.
     pub mender: &'a NetworkMender,
-    /// Whether the caller still waits.
-    pub cancellation: Cancellation<'a>,
+    /// What the call may cost, and whether the caller still waits.
+    pub budget: &'a Budget<'a>,
+}
+
+impl<'a> From<Call<'a>> for PatchWork<'a> {
+    fn from(call: Call<'a>) -> PatchWork<'a> {
+        PatchWork {
+            options: &call.mender.limits.patch,
+            budget: call.budget,
+        }
+    }
 }
 
 impl<'a> From<&'a NetworkMender> for Call<'a> {
     fn from(mender: &'a NetworkMender) -> Self {
         Call {
             mender,
-            cancellation: Cancellation::NEVER,
+            budget: Budget::unlimited(),
         }
     }
 }
@@ -52,14 +65,5 @@ impl<'a> From<&'a NetworkMender> for Call<'a> {
 impl<'a> From<&'a Arc<NetworkMender>> for Call<'a> {
     fn from(mender: &'a Arc<NetworkMender>) -> Self {
         Call::from(&**mender)
-    }
-}
-
-/// # Errors
-/// `Abandoned` when the call was cancelled.
-pub(crate) fn check_cancelled(cancellation: Cancellation) -> Result<(), MendError> {
-    match cancellation.is_cancelled() {
-        true => Err(MendError::Abandoned),
-        false => Ok(()),
     }
 }

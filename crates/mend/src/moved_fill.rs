@@ -8,6 +8,9 @@ use darn_geometry::grid::NormalGrid;
 use darn_geometry::mesh::Vec3;
 use darn_net::Averaging;
 
+/// Nanoseconds of work of the network for moved cloth.
+const FILL_WORK: u64 = 20_000_000;
+
 impl HoleContext<'_> {
     /// Every cell's position, scene space, when some cells of the hole move away from the unedited cloth.
     ///
@@ -32,6 +35,7 @@ impl HoleContext<'_> {
             }
             grid
         };
+        self.budget.spend(FILL_WORK)?;
         let predicted = match self.limits.edited_fill {
             EditedFill::Plain => {
                 let answers = self.inpainter.fill(&[given(1.0)], Averaging::Flips)?;

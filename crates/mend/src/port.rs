@@ -4,7 +4,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use darn_contract::port::{Cancellation, EditSession, Mended, Mender, PatchForm, Patches, Refusal};
+use darn_budget::Budget;
+use darn_contract::port::{EditSession, Mended, Mender, PatchForm, Patches, Refusal};
 use darn_contract::{Constraints, Search, error_chain, v1};
 use darn_gltf_scan::Scan;
 
@@ -22,17 +23,17 @@ pub struct SharedMender(pub Arc<NetworkMender>);
 
 impl SharedMender {
     /// Reads a scan; also returns how long that took.
-    fn scan(&self, bytes: Bytes) -> Result<(Scan, Duration), Refusal> {
+    fn scan(&self, bytes: Bytes, budget: &Budget) -> Result<(Scan, Duration), Refusal> {
         let started = Instant::now();
-        let scan = Scan::read(bytes, &self.0.scan_limits)
-            .map_err(|error| refusal(MendError::Unreadable(error)))?;
+        let scan = Scan::read_within(bytes, &self.0.scan_limits, budget)
+            .map_err(|error| refusal(MendError::unreadable(error)))?;
         Ok((scan, started.elapsed()))
     }
 
-    fn call<'a>(&'a self, cancellation: Cancellation<'a>) -> Call<'a> {
+    fn call<'a>(&'a self, budget: &'a Budget<'a>) -> Call<'a> {
         Call {
             mender: &self.0,
-            cancellation,
+            budget,
         }
     }
 }
@@ -42,61 +43,70 @@ impl Mender for SharedMender {
         &self,
         scan: Bytes,
         constraints: &Constraints,
-        cancellation: Cancellation<'_>,
+        budget: &Budget<'_>,
     ) -> Result<Mended, Refusal> {
-        let (scan, read) = self.scan(scan)?;
-        let mut mended =
-            crate::mend(&scan, constraints, self.call(cancellation)).map_err(refusal)?;
-        add_read_time(&mut mended.report.timings, read);
-        Ok(mended)
+        self.0.pools.run(|| {
+            let (scan, read) = self.scan(scan, budget)?;
+            let mut mended = crate::mend(&scan, constraints, self.call(budget)).map_err(refusal)?;
+            add_read_time(&mut mended.report.timings, read);
+            Ok(mended)
+        })
     }
 
     fn optimize_anchor(
         &self,
         scan: Bytes,
         search: &Search,
-        cancellation: Cancellation<'_>,
+        budget: &Budget<'_>,
     ) -> Result<v1::AnchorFound, Refusal> {
-        let (scan, _) = self.scan(scan)?;
-        crate::optimize_anchor(&scan, search, self.call(cancellation)).map_err(refusal)
+        self.0.pools.run(|| {
+            let (scan, _) = self.scan(scan, budget)?;
+            crate::optimize_anchor(&scan, search, self.call(budget)).map_err(refusal)
+        })
     }
 
     fn mend_to_target(
         &self,
         scan: Bytes,
         search: &Search,
-        cancellation: Cancellation<'_>,
+        budget: &Budget<'_>,
     ) -> Result<Mended, Refusal> {
-        let (scan, read) = self.scan(scan)?;
-        let mut mended =
-            crate::mend_to_target(&scan, search, self.call(cancellation)).map_err(refusal)?;
-        add_read_time(&mut mended.report.timings, read);
-        Ok(mended)
+        self.0.pools.run(|| {
+            let (scan, read) = self.scan(scan, budget)?;
+            let mut mended =
+                crate::mend_to_target(&scan, search, self.call(budget)).map_err(refusal)?;
+            add_read_time(&mut mended.report.timings, read);
+            Ok(mended)
+        })
     }
 
     fn open(
         &self,
         scan: Bytes,
         constraints: &Constraints,
-        cancellation: Cancellation<'_>,
+        budget: &Budget<'_>,
     ) -> Result<Box<dyn EditSession>, Refusal> {
-        let (scan, _) = self.scan(scan)?;
-        let session = ScanSession::open(scan, constraints, Arc::clone(&self.0), cancellation);
-        Ok(Box::new(session.map_err(refusal)?))
+        let session = self.0.pools.run(|| {
+            let (scan, _) = self.scan(scan, budget)?;
+            ScanSession::open(scan, constraints, Arc::clone(&self.0), budget).map_err(refusal)
+        })?;
+        Ok(Box::new(session))
     }
 
-    fn find_holes(&self, scan: Bytes) -> Result<v1::HolesReport, Refusal> {
-        let (scan, read) = self.scan(scan)?;
-        let mut found = crate::find_holes(&scan);
-        add_read_time(&mut found.timings, read);
-        Ok(found)
+    fn find_holes(&self, scan: Bytes, budget: &Budget<'_>) -> Result<v1::HolesReport, Refusal> {
+        self.0.pools.run(|| {
+            let (scan, read) = self.scan(scan, budget)?;
+            let mut found = crate::find_holes(&scan, budget).map_err(refusal)?;
+            add_read_time(&mut found.timings, read);
+            Ok(found)
+        })
     }
 
     fn warm_up(&self) -> Result<(), Refusal> {
         self.inpaint(
             Bytes::from_static(EXAMPLE),
             &Constraints::default(),
-            Cancellation::NEVER,
+            Budget::unlimited(),
         )
         .map(drop)
     }
@@ -115,35 +125,32 @@ impl EditSession for ScanSession {
         &self,
         constraints: &Constraints,
         form: PatchForm,
-        cancellation: Cancellation<'_>,
+        budget: &Budget<'_>,
     ) -> Result<Patches, Refusal> {
-        let call = self.call(cancellation);
-        let (bytes, report) = match form {
-            PatchForm::Glb => call.glb(constraints).map_err(refusal)?,
+        let call = self.call(budget);
+        let (bytes, report) = self.pools().run(|| match form {
+            PatchForm::Glb => call.glb(constraints).map_err(refusal),
             PatchForm::Positions => {
                 let (positions, report) = call.positions(constraints).map_err(refusal)?;
                 let numbers = positions.iter().flatten().flat_map(|p| [p.x, p.y, p.z]);
                 let bytes = numbers.flat_map(|x| (x as f32).to_le_bytes());
-                (bytes.collect(), report)
+                Ok((bytes.collect(), report))
             }
-        };
+        })?;
         Ok(Patches { bytes, report })
     }
 
-    fn mended(
-        &self,
-        constraints: &Constraints,
-        cancellation: Cancellation<'_>,
-    ) -> Result<Mended, Refusal> {
-        self.call(cancellation).mended(constraints).map_err(refusal)
+    fn mended(&self, constraints: &Constraints, budget: &Budget<'_>) -> Result<Mended, Refusal> {
+        let mended = self.pools().run(|| self.call(budget).mended(constraints));
+        mended.map_err(refusal)
     }
 
     fn optimize_anchor(
         &self,
         search: &Search,
-        cancellation: Cancellation<'_>,
+        budget: &Budget<'_>,
     ) -> Result<v1::AnchorFound, Refusal> {
-        let found = self.call(cancellation).optimize_anchor(search);
+        let found = (self.pools()).run(|| self.call(budget).optimize_anchor(search));
         found.map_err(refusal)
     }
 }

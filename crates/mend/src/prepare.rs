@@ -7,17 +7,19 @@ use crate::edit::{HoleCells, ReachLimit, RimPoint};
 use crate::error::MendError;
 use crate::hole::{Hole, UneditedCloths};
 use crate::limits::MendLimits;
+use crate::mender::Call;
 use crate::timings::milliseconds;
 use crate::welded_scan::WeldedScan;
+use darn_budget::{Budget, Exhausted};
 use darn_contract::v1;
-use darn_geometry::flatten::{self, Chart};
+use darn_geometry::flatten::{self, Chart, FlattenError};
 use darn_geometry::grid::{self, CELLS, Grid, Normalisation};
 use darn_geometry::mesh::denoise::denoise;
 use darn_geometry::mesh::index::LoopId;
 use darn_geometry::mesh::layers::layers_near;
-use darn_geometry::mesh::region::{self, Region, RegionError};
+use darn_geometry::mesh::region::{self, BoundedMesh, Region, RegionError};
 use darn_geometry::mesh::{TriMesh, Vec2};
-use darn_geometry::patch::{self, PatchError};
+use darn_geometry::patch::{self, PatchError, PatchWork};
 use darn_geometry::polygon::{extent, inside};
 
 /// Share of the grid's side that the hole should take, so that hole and context share the grid as in training.
@@ -30,39 +32,51 @@ const SHRINK: f64 = 0.6;
 const COLLAR: f64 = 0.2;
 /// Tries with smaller and smaller regions.
 const MAX_TRIES: usize = 4;
+/// Nanoseconds of work of a grid and its plate.
+const GRID_WORK: u64 = 8_000_000;
+/// Nanoseconds of work a face of the scan in the search for other layers near a hole.
+const LAYERS_WORK: u64 = 10;
 
 /// Prepares the hole of a loop. Tries smaller and smaller regions when one gives no usable chart, and at last the cloth
 /// with the scanner's noise.
 ///
 /// # Errors
 /// `Region`, `Flatten`, `TooLittleKnown` or `Patch`, whichever stage fails; of several tries the last one's, of the
-/// denoised cloth.
-pub fn prepare_hole(welded: &WeldedScan, id: u32, limits: &MendLimits) -> Result<Hole, MendError> {
-    let reach = reach_for(estimated_extent(welded, id));
-    without_noise(|denoise| {
+/// denoised cloth. `Exhausted`.
+pub fn prepare_hole(welded: &WeldedScan, id: u32, call: Call) -> Result<Hole, MendError> {
+    let reach = reach_for(estimated_extent(welded, id, call.budget)?);
+    let hole = without_noise(call.budget, |denoise| {
         let preparation = Preparation {
             welded,
             id,
-            limits,
+            limits: &call.mender.limits,
             denoise,
+            budget: call.budget,
         };
         preparation.hole(reach)
-    })
+    })?;
+    call.budget.hold(hole.bytes())?;
+    Ok(hole)
 }
 
 /// Takes the scanner's noise off a mesh; `None` where it has none, or where the noise is to stay.
-type Denoise<'a> = &'a dyn Fn(&TriMesh) -> Option<TriMesh>;
+type Denoise<'a> = &'a dyn Fn(&TriMesh) -> Result<Option<TriMesh>, Exhausted>;
 
 /// The result for the cloth without the scanner's noise; where that cannot be used, for the cloth as it was scanned.
-fn without_noise<T>(attempt: impl Fn(Denoise) -> Result<T, MendError>) -> Result<T, MendError> {
+fn without_noise<T>(
+    budget: &Budget,
+    attempt: impl Fn(Denoise) -> Result<T, MendError>,
+) -> Result<T, MendError> {
     let noisy = Cell::new(false);
     let denoise = |mesh: &TriMesh| {
-        let smooth = denoise(mesh);
+        let smooth = denoise(mesh, budget)?;
         noisy.set(noisy.get() || smooth.is_some());
-        smooth
+        Ok(smooth)
     };
     match attempt(&denoise) {
-        Err(error) if noisy.get() && may_shrink(&error) => attempt(&|_| None).map_err(|_| error),
+        Err(error) if noisy.get() && may_shrink(&error) => {
+            attempt(&|_| Ok(None)).map_err(|_| error)
+        }
         outcome => outcome,
     }
 }
@@ -73,6 +87,7 @@ struct Preparation<'a> {
     id: u32,
     limits: &'a MendLimits,
     denoise: Denoise<'a>,
+    budget: &'a Budget<'a>,
 }
 
 /// The cloth around a hole, laid flat.
@@ -119,6 +134,7 @@ impl Preparation<'_> {
         }
         let mut again = match self.flattened(suitable) {
             Ok(again) => again,
+            Err(MendError::Exhausted(exhausted)) => return Err(exhausted.into()),
             Err(_) => return Ok(flat),
         };
         again.timings.region += flat.timings.region;
@@ -131,16 +147,16 @@ impl Preparation<'_> {
         let hole = self.id;
         let started = Instant::now();
         let region =
-            grown(self.welded, hole, reach).map_err(|source| MendError::Region { hole, source })?;
+            grown(self.welded, hole, reach, self.budget).map_err(MendError::region(hole))?;
         let grown_ms = milliseconds(started);
         let started = Instant::now();
-        let smooth = (self.denoise)(&region.mesh).map(|mesh| Region {
+        let smooth = (self.denoise)(&region.mesh)?.map(|mesh| Region {
             mesh,
             ..region.clone()
         });
         let seen = smooth.as_ref().unwrap_or(&region);
-        let chart = flatten::flatten(seen, &self.limits.flatten)
-            .map_err(|source| MendError::Flatten { hole, source })?;
+        let chart = flatten::flatten(seen, &self.limits.flatten, self.budget)
+            .map_err(MendError::flatten(hole))?;
         let timings = v1::HoleTimings {
             region: grown_ms,
             flatten: milliseconds(started),
@@ -156,11 +172,12 @@ impl Preparation<'_> {
 
     /// Samples the grid and plans the patch.
     fn sampled(&self, flat: FlatRegion) -> Result<Hole, MendError> {
-        let (id, welded, limits) = (self.id, self.welded, self.limits);
+        let (id, welded, budget) = (self.id, self.welded, self.budget);
         let seen = flat.smooth.as_ref().unwrap_or(&flat.region);
         let rim_uv = flat.rim_uv();
         let sample = || {
             let started = Instant::now();
+            budget.spend(GRID_WORK)?;
             let grid = flatten::raster(&seen.mesh, &flat.chart);
             let normal = grid.normalisation().ok_or(MendError::TooLittleKnown {
                 hole: id,
@@ -181,13 +198,18 @@ impl Preparation<'_> {
             let mesh = &welded.surface.mesh;
             // The largest distance that cloth of the hole's extent can have from its rim.
             let beyond = 0.5 * extent(&rim_uv) * flat.chart.frame.side;
+            budget.spend(LAYERS_WORK * mesh.faces.len() as u64)?;
             let others = layers_near(mesh, &flat.region, beyond);
-            let plan = patch::plan_in(mesh, seen, &flat.chart, &limits.patch)
+            let work = PatchWork {
+                options: &self.limits.patch,
+                budget,
+            };
+            let plan = patch::plan_in(mesh, seen, &flat.chart, work)
                 .and_then(|plan| match &flat.smooth {
                     Some(_) => plan.with_region_at(&flat.region.mesh.positions),
                     None => Ok(plan),
                 })
-                .map_err(|source| MendError::Patch { hole: id, source })?;
+                .map_err(MendError::patch(id))?;
             Ok::<_, MendError>((plan.with_layers(&others), milliseconds(started)))
         };
         let (sampled, planned) = rayon::join(sample, plan);
@@ -244,14 +266,13 @@ fn grid_report(sampled: &SampledGrid, rim_uv: &[Vec2]) -> v1::GridReport {
 }
 
 /// The region around a loop, of this reach in scene units.
-fn grown(welded: &WeldedScan, id: u32, reach: f64) -> Result<Region, RegionError> {
-    region::grow(
-        &welded.surface.mesh,
-        &welded.topology,
-        &welded.loops,
-        LoopId(id),
-        reach,
-    )
+fn grown(welded: &WeldedScan, id: u32, reach: f64, budget: &Budget) -> Result<Region, RegionError> {
+    let whole = BoundedMesh {
+        mesh: &welded.surface.mesh,
+        topology: &welded.topology,
+        loops: &welded.loops,
+    };
+    region::grow(&whole, LoopId(id), reach, budget)
 }
 
 /// Reach of the region around a hole of this extent; both in scene units.
@@ -261,12 +282,20 @@ fn reach_for(extent: f64) -> f64 {
 
 /// Larger side of the hole's box in a chart of a narrow collar around it; where the collar cannot be laid flat, that of
 /// a round hole.
-fn estimated_extent(welded: &WeldedScan, id: u32) -> f64 {
+///
+/// # Errors
+/// `Exhausted`.
+fn estimated_extent(welded: &WeldedScan, id: u32, budget: &Budget) -> Result<f64, Exhausted> {
     let round = welded.loops[id as usize].length / std::f64::consts::PI;
-    let collar = grown(welded, id, COLLAR * reach_for(round));
-    match collar.map(|collar| flatten::hole_extent(&collar)) {
-        Ok(Ok(extent)) => extent,
-        _ => round,
+    let collar = match grown(welded, id, COLLAR * reach_for(round), budget) {
+        Ok(collar) => collar,
+        Err(RegionError::Exhausted(exhausted)) => return Err(exhausted),
+        Err(_) => return Ok(round),
+    };
+    match flatten::hole_extent(&collar, budget) {
+        Ok(extent) => Ok(extent),
+        Err(FlattenError::Exhausted(exhausted)) => Err(exhausted),
+        Err(_) => Ok(round),
     }
 }
 
@@ -297,9 +326,9 @@ mod tests {
         // Fails where noise was taken off.
         let fails_if_denoised = |scan: &TriMesh| {
             tries.set(0);
-            without_noise(|denoise| {
+            without_noise(Budget::unlimited(), |denoise| {
                 tries.set(tries.get() + 1);
-                match denoise(scan) {
+                match denoise(scan)? {
                     None => Ok("as scanned"),
                     Some(_) => Err(crosses()),
                 }
@@ -311,9 +340,9 @@ mod tests {
         assert_eq!(tries.get(), 2);
         let always_fails = |scan: &TriMesh, error: fn() -> MendError| {
             tries.set(0);
-            without_noise(|denoise| -> Result<(), MendError> {
+            without_noise(Budget::unlimited(), |denoise| -> Result<(), MendError> {
                 tries.set(tries.get() + 1);
-                denoise(scan);
+                denoise(scan)?;
                 Err(error())
             })
         };

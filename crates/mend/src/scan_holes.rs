@@ -6,19 +6,20 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use crate::VERSION;
-use crate::addition::addition;
+use crate::addition::PatchSource;
 use crate::context::HoleContext;
 use crate::error::MendError;
 use crate::fill_hole::PatchDraft;
 use crate::hole::Hole;
 use crate::hole_report::FilledHole;
 use crate::inpainter::Inpainter;
-use crate::mender::{Call, NetworkMender, check_cancelled};
+use crate::mender::{Call, NetworkMender};
 use crate::prepare::prepare_hole;
 use crate::select::{HoleRequest, Selection};
 use crate::separate::separate;
 use crate::timings::milliseconds;
 use crate::welded_scan::WeldedScan;
+use darn_budget::Budget;
 use darn_contract::port::Mended;
 use darn_contract::{Constraints, FieldError, HoleSelector, Search, v1};
 use darn_gltf_scan::{PatchPrimitive, Scan};
@@ -56,14 +57,14 @@ impl ScanHoles {
     ///
     /// # Errors
     /// A constraint that does not fit the scan, no hole at all, too many holes, a hole that cannot be laid flat;
-    /// `Abandoned`.
+    /// `Exhausted`.
     pub fn open(
         scan: &Scan,
         constraints: &Constraints,
         call: Call,
     ) -> Result<ScanHoles, MendError> {
-        let welded = WeldedScan::of(scan);
-        let selection = Selection::of(scan, &welded, constraints)?;
+        let welded = WeldedScan::of(scan, call.budget)?;
+        let selection = Selection::of(scan, &welded, constraints, call.budget)?;
         Self::prepare(welded, selection, constraints, call)
     }
 
@@ -80,7 +81,7 @@ impl ScanHoles {
             holes: search.hole.map(HoleSelector::Id).into_iter().collect(),
             ..Constraints::default()
         };
-        let welded = WeldedScan::of(scan);
+        let welded = WeldedScan::of(scan, call.budget)?;
         let at_hole = |error| match error {
             MendError::Constraints(fields) => {
                 let at_hole = |f: FieldError| FieldError::new("/hole", f.detail);
@@ -88,7 +89,7 @@ impl ScanHoles {
             }
             other => other,
         };
-        let selection = Selection::of(scan, &welded, &constraints).map_err(at_hole)?;
+        let selection = Selection::of(scan, &welded, &constraints, call.budget).map_err(at_hole)?;
         searched_hole(search, selection.requests.iter().map(|r| r.id))?;
         Self::prepare(welded, selection, &constraints, call)
     }
@@ -108,8 +109,8 @@ impl ScanHoles {
         Inpainter::choose(&call.mender.networks, weights, constraints.up)?;
         let started = Instant::now();
         let prepare = |request: &HoleRequest| {
-            check_cancelled(call.cancellation)?;
-            prepare_hole(&welded, request.id, &call.mender.limits)
+            call.budget.check()?;
+            prepare_hole(&welded, request.id, call)
         };
         // Collected before an error is taken, so that it is always the first hole's, and not the one that failed first.
         let holes: Vec<Result<Hole, MendError>> =
@@ -127,7 +128,7 @@ impl ScanHoles {
     /// Fills the holes with the constraints of the request that they were opened with.
     ///
     /// # Errors
-    /// A constraint that does not fit, a hole that cannot be filled; `Abandoned`.
+    /// A constraint that does not fit, a hole that cannot be filled; `Exhausted`.
     pub fn filled<'a>(&'a self, call: Call<'a>) -> Result<FilledScan<'a>, MendError> {
         let inpainter = self.inpainter(call.mender)?;
         self.filled_as(&self.selection, inpainter, call)
@@ -146,7 +147,7 @@ impl ScanHoles {
     ) -> Result<FilledScan<'a>, MendError> {
         let selection = match later.holes.is_empty() {
             true => self.selection.with_constraints(later)?,
-            false => Selection::of(scan, &self.welded, later)?,
+            false => Selection::of(scan, &self.welded, later, call.budget)?,
         };
         let weights = later.weights.as_deref().or(self.weights.as_deref());
         let up = later.up.or(self.up);
@@ -162,15 +163,15 @@ impl ScanHoles {
     ) -> Result<FilledScan<'a>, MendError> {
         let started = Instant::now();
         let drafts = selection.requests.par_iter().map(|request| {
-            check_cancelled(call.cancellation)?;
+            call.budget.check()?;
             let hole = self.opened(request.id)?;
-            HoleContext::new(hole, &inpainter, &call.mender.limits)?.fill(request)
+            HoleContext::new(hole, &inpainter, call)?.fill(request)
         });
         let drafts: Vec<Result<_, MendError>> = drafts.collect();
         let mut drafts: Vec<PatchDraft> = drafts.into_iter().collect::<Result<_, _>>()?;
-        separate(&mut drafts);
+        separate(&mut drafts, call.budget)?;
         let holes: Vec<Result<_, MendError>> = (drafts.into_par_iter())
-            .map(|draft| draft.measured(&self.welded))
+            .map(|draft| draft.measured(&self.welded, call.budget))
             .collect();
         Ok(FilledScan {
             holes: holes.into_iter().collect::<Result<_, _>>()?,
@@ -184,12 +185,12 @@ impl ScanHoles {
     ///
     /// # Errors
     /// When the patches cannot be written.
-    pub fn mended(&self, scan: &Scan, filled: FilledScan) -> Result<Mended, MendError> {
+    pub fn mended(&self, scan: &Scan, filled: FilledScan, call: Call) -> Result<Mended, MendError> {
         let started = Instant::now();
-        let additions = self.additions(scan, &filled);
+        let additions = self.additions(scan, &filled, call.budget)?;
         let additions_ms = milliseconds(started);
         let started = Instant::now();
-        let bytes = scan.write(&additions)?;
+        let bytes = scan.write_within(&additions, call.budget)?;
         let mut report = self.report(scan, filled);
         if let Some(timings) = &mut report.timings {
             timings.write = milliseconds(started);
@@ -203,11 +204,24 @@ impl ScanHoles {
     }
 
     /// The patches in the scan's terms.
-    pub fn additions(&self, scan: &Scan, filled: &FilledScan) -> Vec<PatchPrimitive> {
-        let card = filled.inpainter.card();
+    ///
+    /// # Errors
+    /// `Exhausted`.
+    pub fn additions(
+        &self,
+        scan: &Scan,
+        filled: &FilledScan,
+        budget: &Budget,
+    ) -> Result<Vec<PatchPrimitive>, MendError> {
+        let source = PatchSource {
+            scan,
+            welded: &self.welded,
+            card: filled.inpainter.card(),
+            budget,
+        };
         let each = filled.holes.par_iter();
-        each.map(|hole| addition(scan, &self.welded, hole, card))
-            .collect()
+        let all = each.map(|hole| Ok(source.addition(hole)?));
+        all.collect()
     }
 
     /// The report of the whole scan.
@@ -233,7 +247,7 @@ impl ScanHoles {
     /// Searches where on a hole's grid a point in space belongs.
     ///
     /// # Errors
-    /// At `/hole` and `/start` when they do not fit; a failure of the network; `Abandoned`.
+    /// At `/hole` and `/start` when they do not fit; a failure of the network; `Exhausted`.
     pub fn search(&self, search: &Search, call: Call) -> Result<v1::AnchorFound, MendError> {
         let id = searched_hole(search, self.holes.iter().map(|h| h.id))?;
         let Some(hole) = self.hole(id) else {
@@ -242,8 +256,8 @@ impl ScanHoles {
             return Err(MendError::Constraints(vec![wrong]));
         };
         let inpainter = self.inpainter(call.mender)?;
-        let context = HoleContext::new(hole, &inpainter, &call.mender.limits)?;
-        context.search(search, call.cancellation)
+        let context = HoleContext::new(hole, &inpainter, call)?;
+        context.search(search)
     }
 
     /// What fills the holes unless a later request says otherwise.

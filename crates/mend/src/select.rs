@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 
 use crate::error::MendError;
 use crate::welded_scan::{WeldedScan, kind};
+use darn_budget::{Budget, Exhausted, Steps};
 use darn_contract::{Anchor, Constraints, Edit, FieldError, HoleSelector, v1};
-use darn_geometry::mesh::Vec3;
 use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind};
 use darn_geometry::mesh::nearest::distance_to_loop;
+use darn_geometry::mesh::{TriMesh, Vec3};
 use darn_gltf_scan::Scan;
 
 /// Which loops are filled with which constraints, and which are left.
@@ -54,12 +55,14 @@ impl Selection {
     ///
     /// # Errors
     /// `Constraints` for every selector, anchor or gesture that matches no loop to fill; `NonManifold` when the rim of
-    /// a selected hole is no closed line; `NoHoles` when nothing is selected and there is no hole.
+    /// a selected hole is no closed line; `NoHoles` when nothing is selected and there is no hole; `Exhausted`.
     pub fn of(
         scan: &Scan,
         welded: &WeldedScan,
         constraints: &Constraints,
+        budget: &Budget,
     ) -> Result<Selection, MendError> {
+        let mut near = NearestHole::of(welded, budget);
         let mut wrong = Vec::new();
         let mut requests = Requests::default();
         if constraints.holes.is_empty() {
@@ -68,7 +71,11 @@ impl Selection {
             fillable.for_each(|l| requests.add(l.id.0));
         }
         for (i, selector) in constraints.holes.iter().enumerate() {
-            match find(scan, welded, selector) {
+            let rim = match selector {
+                HoleSelector::Id(id) => with_id(welded, *id),
+                HoleSelector::Near(point) => near.to(&Vec3::from(*point))?,
+            };
+            match rim.and_then(|rim| fillable(scan, welded, rim)) {
                 Ok(id) => requests.add(id),
                 Err(detail) => wrong.push(FieldError::new(format!("/holes/{i}"), detail)),
             }
@@ -160,25 +167,91 @@ impl Requests {
     }
 }
 
-/// The id of the loop that a selector names, or why there is none.
-fn find(scan: &Scan, welded: &WeldedScan, selector: &HoleSelector) -> Result<u32, String> {
-    match selector {
-        HoleSelector::Id(id) => {
-            let rim = welded.loops.get(*id as usize).ok_or_else(|| {
-                format!(
-                    "there is no loop {id}; the scan has {} boundary loop(s), numbered from 0",
-                    welded.loops.len()
-                )
-            })?;
-            fillable(scan, welded, rim)
+/// The loop with an id, or why there is none.
+fn with_id(welded: &WeldedScan, id: u32) -> Result<&BoundaryLoop, String> {
+    welded.loops.get(id as usize).ok_or_else(|| {
+        format!(
+            "there is no loop {id}; the scan has {} boundary loop(s), numbered from 0",
+            welded.loops.len()
+        )
+    })
+}
+
+/// Finds the hole whose rim is nearest to a point.
+struct NearestHole<'a> {
+    welded: &'a WeldedScan,
+    /// The holes with the balls around their rims; made when the first point is looked for.
+    holes: Option<Vec<RimBall<'a>>>,
+    steps: Steps<'a>,
+}
+
+/// A rim and a ball that it lies in.
+struct RimBall<'a> {
+    rim: &'a BoundaryLoop,
+    centre: Vec3,
+    radius: f64,
+}
+
+/// Nanoseconds of work a ball for a point.
+const BALL_WORK: u64 = 10;
+/// Nanoseconds of work an edge of a rim for a point.
+const EDGE_WORK: u64 = 20;
+
+impl<'a> NearestHole<'a> {
+    fn of(welded: &'a WeldedScan, budget: &'a Budget<'a>) -> NearestHole<'a> {
+        NearestHole {
+            welded,
+            holes: None,
+            steps: Steps::of(budget),
         }
-        HoleSelector::Near(point) => {
-            let point = Vec3::from(*point);
-            let holes = welded.loops.iter().filter(|l| l.kind == LoopKind::Hole);
-            let near = holes.map(|l| (distance_to_loop(&welded.surface.mesh, l, &point), l));
-            let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0));
-            let (_, rim) = nearest.ok_or_else(|| "the scan has no hole".to_owned())?;
-            fillable(scan, welded, rim)
+    }
+
+    /// The hole nearest to a point, the first of several, or why there is none.
+    ///
+    /// # Errors
+    /// `Exhausted`: a request may have thousands of points, a scan hundreds of thousands of loops.
+    fn to(&mut self, point: &Vec3) -> Result<Result<&'a BoundaryLoop, String>, Exhausted> {
+        let mesh = &self.welded.surface.mesh;
+        let holes = self.holes.get_or_insert_with(|| {
+            let holes = self
+                .welded
+                .loops
+                .iter()
+                .filter(|l| l.kind == LoopKind::Hole);
+            holes.map(|rim| RimBall::of(rim, mesh)).collect()
+        });
+        self.steps.take(BALL_WORK * holes.len() as u64)?;
+        let mut best: Option<(f64, &BoundaryLoop)> = None;
+        for hole in holes.iter() {
+            let least = (hole.centre - point).norm() - hole.radius;
+            if best.is_some_and(|(distance, _)| least > distance) {
+                continue;
+            }
+            self.steps
+                .take(EDGE_WORK * hole.rim.vertices.len() as u64)?;
+            let distance = distance_to_loop(mesh, hole.rim, point);
+            if best.is_none_or(|(least, _)| distance.total_cmp(&least).is_lt()) {
+                best = Some((distance, hole.rim));
+            }
+        }
+        Ok(best
+            .map(|(_, rim)| rim)
+            .ok_or_else(|| "the scan has no hole".to_owned()))
+    }
+}
+
+impl<'a> RimBall<'a> {
+    fn of(rim: &'a BoundaryLoop, mesh: &TriMesh) -> RimBall<'a> {
+        let places = || rim.vertices.iter().map(|v| mesh.positions[v.index()]);
+        let low = places().fold(Vec3::repeat(f64::MAX), |m, p| m.inf(&p));
+        let high = places().fold(Vec3::repeat(f64::MIN), |m, p| m.sup(&p));
+        let centre = (low + high) * 0.5;
+        let radius = places().map(|p| (p - centre).norm()).fold(0.0, f64::max);
+        RimBall {
+            rim,
+            centre,
+            // A rounding error must not hide the nearest.
+            radius: radius * (1.0 + 1e-9),
         }
     }
 }
@@ -256,7 +329,7 @@ mod tests {
     static TWO_HOLES: LazyLock<TwoHoles> = LazyLock::new(|| {
         let keep = |u: f64, v: f64| (u - 0.3).hypot(v - 0.5).min((u - 0.7).hypot(v - 0.5)) > 0.1;
         let scan = scan_of(&sheet(24, keep, |u, v| Vec3::new(u, v, 0.0)));
-        let welded = WeldedScan::of(&scan);
+        let welded = WeldedScan::of(&scan, Budget::unlimited()).unwrap();
         let of_kind = |kind| {
             let ids = welded.loops.iter().filter(|l| l.kind == kind);
             ids.map(|l| l.id.0).collect::<Vec<u32>>()
@@ -275,7 +348,12 @@ mod tests {
     });
 
     fn selected(constraints: &Constraints) -> Result<Selection, MendError> {
-        Selection::of(&TWO_HOLES.scan, &TWO_HOLES.welded, constraints)
+        Selection::of(
+            &TWO_HOLES.scan,
+            &TWO_HOLES.welded,
+            constraints,
+            Budget::unlimited(),
+        )
     }
 
     fn holes(selectors: &[HoleSelector]) -> Constraints {
@@ -309,6 +387,27 @@ mod tests {
             let other = selection.skipped.iter().find(|s| s.code == "not_selected");
             assert_eq!(other.unwrap().id, TWO_HOLES.holes[1 - hole]);
         }
+    }
+
+    proptest! {
+        #[test]
+        fn the_nearest_hole_is_the_one_of_least_distance(x in -2.0..3.0f64, y in -2.0..3.0f64, z in -1.0..1.0f64) {
+            let welded = &TWO_HOLES.welded;
+            let point = Vec3::new(x, y, z);
+            let found = NearestHole::of(welded, Budget::unlimited()).to(&point).unwrap().unwrap();
+            let distance = |rim: &BoundaryLoop| distance_to_loop(&welded.surface.mesh, rim, &point);
+            let least = TWO_HOLES.holes.map(|id| distance(&welded.loops[id as usize]));
+            prop_assert_eq!(distance(found), least[0].min(least[1]));
+        }
+    }
+
+    #[test]
+    fn many_places_ask_the_budget() {
+        let left = Budget::new(darn_budget::Limits::default(), &|| true);
+        let places = vec![HoleSelector::Near([0.0; 3]); 100_000];
+        let constraints = holes(&places);
+        let refused = Selection::of(&TWO_HOLES.scan, &TWO_HOLES.welded, &constraints, &left);
+        assert!(matches!(refused, Err(MendError::Exhausted(_))));
     }
 
     #[test]
@@ -364,7 +463,12 @@ mod tests {
     fn the_ends_of_a_tube_are_left_and_a_hole_in_its_side_is_filled() {
         let window = |u: f64, v: f64| (u - 0.5).abs() > 0.1 || (v - 0.5).abs() > 0.1;
         let scan = scan_of(&tube(24, window));
-        let selection = Selection::of(&scan, &WeldedScan::of(&scan), &Constraints::default());
+        let selection = Selection::of(
+            &scan,
+            &WeldedScan::of(&scan, Budget::unlimited()).unwrap(),
+            &Constraints::default(),
+            Budget::unlimited(),
+        );
         let selection = selection.unwrap();
         assert_eq!(selection.requests.len(), 1);
         assert!(selection.skipped.iter().all(|s| s.code == "tube_end"));
@@ -374,7 +478,12 @@ mod tests {
     #[test]
     fn a_scan_without_holes_is_refused_with_the_loops_that_it_has() {
         let scan = scan_of(&sheet(4, |_, _| true, |u, v| Vec3::new(u, v, 0.0)));
-        let error = Selection::of(&scan, &WeldedScan::of(&scan), &Constraints::default());
+        let error = Selection::of(
+            &scan,
+            &WeldedScan::of(&scan, Budget::unlimited()).unwrap(),
+            &Constraints::default(),
+            Budget::unlimited(),
+        );
         let error = error.unwrap_err();
         assert!(matches!(&error, MendError::NoHoles { skipped } if skipped.len() == 1));
     }

@@ -3,21 +3,31 @@
 
 use std::collections::HashSet;
 
+use darn_budget::{Budget, Exhausted};
+
 use crate::fill_hole::PatchDraft;
 use darn_geometry::mesh::{TriMesh, Vec3};
 
 /// Pushes every patch away from those before it where their boxes meet. The drafts are in order of id, so that the
 /// result does not depend on threads.
-pub fn separate(drafts: &mut [PatchDraft]) {
+///
+/// # Errors
+/// `Exhausted`.
+pub fn separate(drafts: &mut [PatchDraft], budget: &Budget) -> Result<(), Exhausted> {
     for own in 1..drafts.len() {
+        budget.spend(DRAFT_WORK * own as u64)?;
         let (before, rest) = drafts.split_at_mut(own);
         let own = &mut rest[0];
         let others = near(own, before);
         if !others.faces.is_empty() {
-            own.hole.plan.separate(&mut own.patch, &others);
+            own.hole.plan.separate(&mut own.patch, &others, budget)?;
         }
     }
+    Ok(())
 }
+
+/// Nanoseconds of work another patch, whose box is computed and compared.
+const DRAFT_WORK: u64 = 1000;
 
 /// The triangles of other patches whose box meets the box of a patch. Triangles with a vertex on the patch's own rim
 /// touch it there and are left out.

@@ -2,13 +2,15 @@
 
 use std::sync::Arc;
 
+use crate::call_pools::CallPools;
 use crate::error::MendError;
 use crate::hole::Hole;
 use crate::hole_report::FilledHole;
 use crate::mender::{Call, NetworkMender};
 use crate::picture;
 use crate::scan_holes::{FilledScan, ScanHoles};
-use darn_contract::port::{Cancellation, Mended};
+use darn_budget::Budget;
+use darn_contract::port::Mended;
 use darn_contract::{Constraints, FieldError, Search, v1};
 use darn_geometry::mesh::{Vec2, Vec3};
 use darn_gltf_scan::export::{NewMesh, meshes};
@@ -31,7 +33,7 @@ impl ScanSession {
         scan: Scan,
         constraints: &Constraints,
         mender: Arc<NetworkMender>,
-        cancellation: Cancellation,
+        budget: &Budget,
     ) -> Result<ScanSession, MendError> {
         let entries = [
             ("/anchors", constraints.anchors.len()),
@@ -49,7 +51,7 @@ impl ScanSession {
         }
         let call = Call {
             mender: &mender,
-            cancellation,
+            budget,
         };
         let holes = ScanHoles::open(&scan, constraints, call)?;
         let described = described(&holes, &scan, call)?;
@@ -78,13 +80,18 @@ impl ScanSession {
         counted + counted / 2
     }
 
-    /// A call to the session, with its caller's cancellation check.
-    pub fn call<'a>(&'a self, cancellation: Cancellation<'a>) -> SessionCall<'a> {
+    /// The threads of its calls.
+    pub(crate) fn pools(&self) -> &CallPools {
+        &self.mender.pools
+    }
+
+    /// A call to the session, with what it may cost.
+    pub fn call<'a>(&'a self, budget: &'a Budget<'a>) -> SessionCall<'a> {
         SessionCall {
             session: self,
             call: Call {
                 mender: &self.mender,
-                cancellation,
+                budget,
             },
         }
     }
@@ -108,7 +115,7 @@ impl ScanSession {
     }
 }
 
-/// A session and its caller's cancellation check.
+/// A session and what a call to it may cost.
 #[derive(Clone, Copy)]
 pub struct SessionCall<'a> {
     session: &'a ScanSession,
@@ -123,7 +130,10 @@ impl<'a> SessionCall<'a> {
     /// As [`mend`](crate::mend).
     pub fn mended(&self, constraints: &Constraints) -> Result<Mended, MendError> {
         let filled = self.filled(constraints)?;
-        let mut mended = self.session.holes.mended(&self.session.scan, filled)?;
+        let mut mended = self
+            .session
+            .holes
+            .mended(&self.session.scan, filled, self.call)?;
         self.session.remove_preparation(&mut mended.report);
         Ok(mended)
     }
@@ -134,7 +144,8 @@ impl<'a> SessionCall<'a> {
     /// As [`mend`](crate::mend).
     pub fn glb(&self, constraints: &Constraints) -> Result<(Vec<u8>, v1::Report), MendError> {
         let filled = self.filled(constraints)?;
-        let additions = (self.session.holes).additions(&self.session.scan, &filled);
+        let additions =
+            (self.session.holes).additions(&self.session.scan, &filled, self.call.budget)?;
         let bytes = glb(&self.session.scan, &additions)?;
         Ok((bytes, self.session.report(filled)))
     }
@@ -157,7 +168,7 @@ impl<'a> SessionCall<'a> {
     /// Searches where on a hole's grid a point in space belongs, with the weights of the opening.
     ///
     /// # Errors
-    /// At `/hole` and `/start` when they do not fit; a failure of the network; `Abandoned`.
+    /// At `/hole` and `/start` when they do not fit; a failure of the network; `Exhausted`.
     pub fn optimize_anchor(&self, search: &Search) -> Result<v1::AnchorFound, MendError> {
         self.session.holes.search(search, self.call)
     }
@@ -177,7 +188,7 @@ fn described(opened: &ScanHoles, scan: &Scan, call: Call) -> Result<v1::Session,
         report,
     } in &filled.holes
     {
-        let unedited = hole.unedited(&filled.inpainter, &call.mender.limits)?;
+        let unedited = hole.unedited(&filled.inpainter, call)?;
         let rim = patch.rim.len();
         let uv = |p: &Vec2| <[f64; 2]>::from(hole.chart.frame.uv(*p));
         let png = picture::chart_png(hole, patch).map_err(MendError::Picture)?;
@@ -261,7 +272,7 @@ mod tests {
     #[test]
     fn a_session_mends_and_refuses_as_a_single_call_does() {
         let scan = || scan_of(&holed_sheet(24, 0.15));
-        let (mender, never) = (mender(), Cancellation::NEVER);
+        let (mender, never) = (mender(), Budget::unlimited());
         let opening = Constraints::default();
         let session = ScanSession::open(scan(), &opening, Arc::clone(mender), never).unwrap();
         let hole = session.described().holes[0].id;
@@ -302,7 +313,7 @@ mod tests {
             ..Constraints::default()
         };
         let scan = scan_of(&holed_sheet(8, 0.15));
-        let error = ScanSession::open(scan, &asked, Arc::clone(mender()), Cancellation::NEVER);
+        let error = ScanSession::open(scan, &asked, Arc::clone(mender()), Budget::unlimited());
         let fields = error.err().expect("a refusal").fields();
         let pointers: Vec<&str> = fields.iter().map(|f| f.pointer.as_str()).collect();
         assert_eq!(pointers, ["/anchors", "/edits"]);

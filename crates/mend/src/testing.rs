@@ -9,6 +9,7 @@ use crate::mender::NetworkMender;
 use crate::prepare::prepare_hole;
 use crate::select::{Entry, HoleRequest};
 use crate::welded_scan::WeldedScan;
+use darn_budget::Budget;
 use darn_contract::{Anchor, Edit, Gesture};
 use darn_geometry::mesh::TriMesh;
 use darn_geometry::mesh::loops::LoopKind;
@@ -90,13 +91,13 @@ pub fn scan_of(mesh: &TriMesh) -> Scan {
 /// A round hole in a flat sheet; on the chart it is about a disk of radius ¼ in the middle.
 pub fn context() -> HoleContext<'static> {
     static HOLE: LazyLock<Hole> = LazyLock::new(|| {
-        let welded = WeldedScan::of(&scan_of(&holed_sheet(30, 0.15)));
+        let welded = WeldedScan::of(&scan_of(&holed_sheet(30, 0.15)), Budget::unlimited()).unwrap();
         let mut loops = welded.loops.iter();
         let hole = loops.find(|l| l.kind == LoopKind::Hole).expect("a hole");
-        prepare_hole(&welded, hole.id.0, &mender().limits).expect("cloth that lies flat")
+        prepare_hole(&welded, hole.id.0, mender().into()).expect("cloth that lies flat")
     });
     let inpainter = Inpainter::choose(&mender().networks, None, None).expect("a network");
-    HoleContext::new(&HOLE, &inpainter, &mender().limits).expect("a patch")
+    HoleContext::new(&HOLE, &inpainter, mender().into()).expect("a patch")
 }
 
 /// A request with these anchors and gestures, in this order.

@@ -2,8 +2,10 @@
 
 use std::time::Instant;
 
+use darn_budget::{Budget, Exhausted};
+
 use crate::timings::milliseconds;
-use darn_contract::v1;
+use darn_contract::{excerpt, v1};
 use darn_geometry::mesh::index::{FaceId, VertexId};
 use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind, boundary_loops};
 use darn_geometry::mesh::topology::Topology;
@@ -22,6 +24,13 @@ pub struct WeldedScan {
     pub timings: v1::ScanTimings,
 }
 
+/// Bytes of memory a face while a scan is welded and its loops are found.
+const WELDING: usize = 150;
+/// Nanoseconds of work a face in welding.
+const WELD_WORK: u64 = 120;
+/// Nanoseconds of work a face in finding the loops.
+const LOOPS_WORK: u64 = 80;
+
 /// A face of a scan.
 #[derive(Debug, Clone, Copy)]
 pub struct SourceFace {
@@ -33,11 +42,18 @@ pub struct SourceFace {
 
 impl WeldedScan {
     /// Welds a scan and finds its loops.
-    pub fn of(scan: &Scan) -> WeldedScan {
+    ///
+    /// # Errors
+    /// `Exhausted`.
+    pub fn of(scan: &Scan, budget: &Budget) -> Result<WeldedScan, Exhausted> {
         let started = Instant::now();
+        let faces = scan.surface.faces.len();
+        budget.hold(WELDING * faces)?;
+        budget.spend_at_once(WELD_WORK * faces as u64)?;
         let surface = weld(&scan.surface);
         let weld = milliseconds(started);
         let started = Instant::now();
+        budget.spend_at_once(LOOPS_WORK * faces as u64)?;
         let topology = surface.topology();
         let loops = boundary_loops(&surface.mesh, &topology);
         let timings = v1::ScanTimings {
@@ -45,12 +61,15 @@ impl WeldedScan {
             loops: milliseconds(started),
             ..Default::default()
         };
-        WeldedScan {
+        let welded = WeldedScan {
             surface,
             topology,
             loops,
             timings,
-        }
+        };
+        budget.release(WELDING * faces);
+        budget.hold(welded.bytes())?;
+        Ok(welded)
     }
 
     /// Bytes of memory that it holds, estimated.
@@ -87,8 +106,8 @@ impl WeldedScan {
             turning: rim.turning,
             mesh: part
                 .and_then(|p| scan.mesh_name(p))
-                .unwrap_or_default()
-                .to_owned(),
+                .map(|name| excerpt(name).into_owned())
+                .unwrap_or_default(),
             component: rim.component,
         }
     }

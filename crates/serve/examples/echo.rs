@@ -9,7 +9,8 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use clap::Parser;
-use darn_contract::port::{Cancellation, EditSession, Mended, Mender, Refusal};
+use darn_budget::Budget;
+use darn_contract::port::{EditSession, Mended, Mender, Refusal};
 use darn_contract::{Constraints, Search, codes, v1};
 use darn_serve::{LogDelivery, LogError, ServeArgs, ServeError, run, start_logging};
 
@@ -22,12 +23,7 @@ struct Args {
 struct Echo;
 
 impl Mender for Echo {
-    fn inpaint(
-        &self,
-        scan: Bytes,
-        _: &Constraints,
-        _: Cancellation<'_>,
-    ) -> Result<Mended, Refusal> {
+    fn inpaint(&self, scan: Bytes, _: &Constraints, _: &Budget<'_>) -> Result<Mended, Refusal> {
         let bytes = scan.into();
         let report = v1::Report::default();
         Ok(Mended {
@@ -37,7 +33,7 @@ impl Mender for Echo {
         })
     }
 
-    fn find_holes(&self, _: Bytes) -> Result<v1::HolesReport, Refusal> {
+    fn find_holes(&self, _: Bytes, _: &Budget<'_>) -> Result<v1::HolesReport, Refusal> {
         Ok(v1::HolesReport::default())
     }
 
@@ -45,12 +41,12 @@ impl Mender for Echo {
         &self,
         _: Bytes,
         _: &Search,
-        _: Cancellation<'_>,
+        _: &Budget<'_>,
     ) -> Result<v1::AnchorFound, Refusal> {
         Err(no_holes())
     }
 
-    fn mend_to_target(&self, _: Bytes, _: &Search, _: Cancellation<'_>) -> Result<Mended, Refusal> {
+    fn mend_to_target(&self, _: Bytes, _: &Search, _: &Budget<'_>) -> Result<Mended, Refusal> {
         Err(no_holes())
     }
 
@@ -58,7 +54,7 @@ impl Mender for Echo {
         &self,
         _: Bytes,
         _: &Constraints,
-        _: Cancellation<'_>,
+        _: &Budget<'_>,
     ) -> Result<Box<dyn EditSession>, Refusal> {
         Err(no_holes())
     }

@@ -19,7 +19,8 @@ use super::{
     config::ServeArgs,
     connection_table::{ConnectionLimits, ConnectionTable},
     error::RequestError,
-    job::PoolError,
+    fair_queue::Client,
+    job::{JobOrder, PoolError},
     kept_session::KeptSession,
     pace::PaceLimits,
     pool::Pool,
@@ -27,7 +28,17 @@ use super::{
     telemetry::Metrics,
     uploads::{BodySize, Sharing, UploadRefusal, UploadSlot, Uploads},
 };
-use darn_contract::port::{Cancellation, Mender, Refusal};
+use darn_budget::{Budget, Limits, MemoryPool};
+use darn_contract::port::{Mender, Refusal};
+
+/// Work that a request may cost for each byte of its scan, in nanoseconds of one core. Mends of real scans take up to 1,500.
+const WORK_PER_BYTE: u64 = 40_000;
+/// Bytes of memory that a request may hold for each byte of its scan.
+const MEMORY_PER_BYTE: usize = 150;
+/// Bytes of memory that any request may hold.
+const LEAST_MEMORY: usize = 64 << 20;
+/// What a job costs beside the bytes of its scan, in bytes: it orders small jobs.
+const JOB_COST: u64 = 100_000;
 
 /// The running service, apart from its sockets.
 pub struct App {
@@ -42,6 +53,8 @@ pub struct App {
     /// Scans kept for editing.
     pub sessions: Arc<SessionStore>,
     pool: Pool,
+    /// Whether clients are told apart by their address.
+    sharing: Sharing,
     /// The bodies being received.
     uploads: Uploads,
     mender: Arc<dyn Mender>,
@@ -54,7 +67,28 @@ pub struct App {
 /// It is not a place in the queue: a body that comes slowly takes no place. Memory holds at most one body per upload permit, waiting job
 /// and running job, each within the body limit; a multipart body counts twice while it is split.
 #[derive(Debug)]
-pub struct UploadPermit(#[allow(dead_code, reason = "held for its drop")] UploadSlot);
+pub struct UploadPermit {
+    /// Whom the request is from.
+    client: Client,
+    #[allow(dead_code, reason = "held for its drop")]
+    slot: UploadSlot,
+}
+
+impl UploadPermit {
+    /// Whom the request is from.
+    pub fn client(&self) -> Client {
+        self.client
+    }
+}
+
+/// The size of a request, by which its cost is estimated and limited.
+#[derive(Debug, Clone, Copy)]
+struct JobSize {
+    /// Whom it is for.
+    client: Client,
+    /// Bytes of its scan.
+    bytes: usize,
+}
 
 /// When a request's result comes too late.
 #[derive(Debug, Clone, Copy)]
@@ -72,12 +106,16 @@ impl Deadline {
 }
 
 /// Limits of a request.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct RequestLimits {
     /// Longest time for waiting and mending together.
     pub deadline: Duration,
     /// Most bytes of a body.
     pub body: usize,
+    /// The memory that bodies, jobs and answers share.
+    pub memory: Arc<MemoryPool>,
+    /// Work that a request may cost whatever its size, as CPU time.
+    pub work: Duration,
     /// Longest time between two pieces of a body.
     pub body_pause: Duration,
     /// Fewest bytes per second of a body; 0 for no such limit.
@@ -118,6 +156,8 @@ impl App {
         let sessions = SessionStore::new(session_limits, metrics.sessions());
         let limits = RequestLimits {
             deadline: settings.deadline,
+            memory: MemoryPool::new(settings.memory()),
+            work: settings.work,
             body: settings.body_limit,
             body_pause: settings.body_timeout,
             body_rate: settings.body_rate,
@@ -138,6 +178,7 @@ impl App {
             allow_origin: settings.allow_origin.clone(),
             sessions,
             pool,
+            sharing,
             uploads: Uploads::new(settings.uploads(), sharing),
             mender,
             warm: AtomicBool::new(false),
@@ -151,18 +192,15 @@ impl App {
     /// The mender's refusal or the pool's error.
     pub async fn warm_up(&self) -> Result<(), RequestError> {
         let deadline = Deadline::after(Duration::from_secs(3600));
-        self.run_job(None, deadline, |mender, _| mender.warm_up())
+        let size = JobSize {
+            client: None,
+            bytes: 0,
+        };
+        // Without the budget, whose limits are no concern of the example's.
+        self.run_job(None, size, deadline, |mender, _| mender.warm_up())
             .await?;
         self.warm.store(true, Relaxed);
         Ok(())
-    }
-
-    /// Takes an upload permit for a large body of a client whose address is not known.
-    ///
-    /// # Errors
-    /// `UploadsFull`, `QueueFull` or `Draining`.
-    pub fn upload_permit(&self) -> Result<UploadPermit, RequestError> {
-        self.upload_permit_for(BodySize::Large, None)
     }
 
     /// Takes an upload permit before a request's body is read, of which at most `limit` bytes count.
@@ -191,25 +229,32 @@ impl App {
         // Checked after the permit was taken: a drain waits for the permits taken before it.
         self.check_serving()?;
         let retry_after = self.limits.body_pause.as_secs().clamp(1, 60);
-        let upload = permit.map(UploadPermit).map_err(|refusal| match refusal {
+        let slot = permit.map_err(|refusal| match refusal {
             UploadRefusal::Full(limit) => RequestError::UploadsFull { limit, retry_after },
             UploadRefusal::ShareFull(limit) => RequestError::UploadShareFull { limit, retry_after },
         })?;
-        (self.pool.check_capacity()).map_err(|error| of_pool(error, self.limits.deadline))?;
+        let client = client.filter(|_| self.sharing == Sharing::ByAddress);
+        (self.pool.check_capacity(client)).map_err(|error| of_pool(error, self.limits.deadline))?;
+        let upload = UploadPermit { client, slot };
         Ok(upload)
     }
 
-    /// Runs a job on a worker, within the deadline.
+    /// Runs a job on a scan of this many bytes on a worker, within the deadline and the work and memory that such a scan may cost.
     ///
     /// # Errors
     /// `Refused`, `QueueFull`, `Deadline`, `Draining`, or `Internal` when the mender failed or panicked.
     pub async fn submit<T: Send + 'static>(
         &self,
         upload: UploadPermit,
-        job: impl FnOnce(&dyn Mender, Cancellation<'_>) -> Result<T, Refusal> + Send + 'static,
+        bytes: usize,
+        job: impl FnOnce(&dyn Mender, &Budget<'_>) -> Result<T, Refusal> + Send + 'static,
     ) -> Result<T, RequestError> {
         let deadline = Deadline::after(self.limits.deadline);
-        self.run_job(Some(upload), deadline, job).await
+        let size = JobSize {
+            client: upload.client,
+            bytes,
+        };
+        self.run_job(Some(upload), size, deadline, job).await
     }
 
     /// Runs a job on a session, on a worker, within the deadline, which includes waiting for exclusive use of the session. A request that
@@ -222,30 +267,49 @@ impl App {
         &self,
         id: Uuid,
         upload: UploadPermit,
-        job: impl FnOnce(&KeptSession, Cancellation<'_>) -> Result<T, Refusal> + Send + 'static,
+        job: impl FnOnce(&KeptSession, &Budget<'_>) -> Result<T, Refusal> + Send + 'static,
     ) -> Result<T, RequestError> {
         let deadline = Deadline::after(self.limits.deadline);
         let lease = self.sessions.lease(id, std::time::Instant::now())?;
         let guard = timeout_at(deadline.at, lease.exclusive()).await;
         let guard = guard.map_err(|_| of_pool(PoolError::Expired, deadline.length))?;
-        self.run_job(Some(upload), deadline, move |_, cancellation| {
-            guard.run(|session| job(session, cancellation))
+        let size = JobSize {
+            client: upload.client,
+            bytes: guard.scan_bytes(),
+        };
+        self.run_job(Some(upload), size, deadline, move |_, budget| {
+            guard.run(|session| job(session, budget))
         })
         .await
+    }
+
+    /// What a job on a scan of this many bytes may cost.
+    fn job_limits(&self, bytes: usize) -> Limits {
+        let per_byte = (WORK_PER_BYTE * bytes as u64).max(self.limits.work.as_nanos() as u64);
+        Limits {
+            work: per_byte,
+            memory: (MEMORY_PER_BYTE * bytes).max(LEAST_MEMORY),
+            pool: Some(Arc::clone(&self.limits.memory)),
+            ..Limits::default()
+        }
     }
 
     async fn run_job<T: Send + 'static>(
         &self,
         upload: Option<UploadPermit>,
+        size: JobSize,
         deadline: Deadline,
-        job: impl FnOnce(&dyn Mender, Cancellation<'_>) -> Result<T, Refusal> + Send + 'static,
+        job: impl FnOnce(&dyn Mender, &Budget<'_>) -> Result<T, Refusal> + Send + 'static,
     ) -> Result<T, RequestError> {
         let mender = Arc::clone(&self.mender);
-        let outcome = match self.pool.reserve() {
+        let order = JobOrder {
+            cost: JOB_COST + size.bytes as u64,
+            deadline: deadline.at,
+            limits: self.job_limits(size.bytes),
+        };
+        let outcome = match self.pool.reserve(size.client) {
             Ok(permit) => {
-                let answer = (self.pool).run(permit, deadline.at, move |cancellation| {
-                    job(&*mender, cancellation)
-                });
+                let answer = (self.pool).run(permit, order, move |budget| job(&*mender, budget));
                 // Only now that the job is queued: a drain closes the queue once no upload permit is taken.
                 drop(upload);
                 answer.await

@@ -7,11 +7,12 @@ use axum::{
     extract::{DefaultBodyLimit, FromRequest, Multipart, Request, multipart::MultipartError},
     http::{HeaderMap, header, request::Parts},
 };
-use bytes::{Bytes, BytesMut};
+use bytes::Bytes;
 use tokio::time::{Duration, Instant, timeout, timeout_at};
 
 use super::{
     app::{App, RequestLimits, UploadPermit},
+    counted::{CountedBytes, counted, take},
     error::RequestError,
     media_types::{FORM_DATA, GLB, GLTF, JSON, OCTET_STREAM},
     pace::{PaceLimits, TooSlow},
@@ -143,7 +144,12 @@ async fn read_scan<P: Parameters>(
     let (kind, bytes) = read_body(&parts, body, limits, check_headers).await?;
     let (scan, parameters) = match kind {
         ScanBody::Bare => (bytes, None),
-        ScanBody::Form => split_form(parts, bytes).await?,
+        ScanBody::Form => {
+            // Splitting copies the parts.
+            let memory = take(&limits.memory, bytes.len())?;
+            let (scan, parameters) = split_form(parts, bytes).await?;
+            (counted(scan, memory), parameters)
+        }
     };
     if scan.is_empty() {
         return Err(RequestError::EmptyBody);
@@ -166,7 +172,7 @@ pub async fn read_parameters<P: Parameters>(
     let (parts, body) = request.into_parts();
     let limits = RequestLimits {
         body: parameters::MAX_BYTES,
-        ..*limits
+        ..limits.clone()
     };
     let check_headers = || {
         check_encoding(&parts.headers)?;
@@ -294,13 +300,13 @@ fn check_length(headers: &HeaderMap, limit: usize) -> Result<(), RequestError> {
 
 async fn read_bytes(body: &mut Body, limits: &RequestLimits) -> Result<Bytes, RequestError> {
     let timer = BodyTimer::new(limits);
-    let mut bytes = BytesMut::new();
+    let mut bytes = CountedBytes::new(&limits.memory)?;
     while let Some(piece) = timer.next(next_piece(body)).await? {
         let piece = piece.map_err(|error| timer.broken_off(&error))?;
         if bytes.len() + piece.len() > limits.body {
             return Err(RequestError::TooLarge { limit: limits.body });
         }
-        bytes.extend_from_slice(&piece);
+        bytes.extend(&piece)?;
     }
     Ok(bytes.freeze())
 }

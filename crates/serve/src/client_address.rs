@@ -9,11 +9,11 @@ const NETWORK_BITS: u128 = !0 << 64;
 ///
 /// An IPv6 address stands for its whole /64 network; an IPv4 address written as IPv6 is the IPv4 address.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) struct ClientAddress(pub(crate) IpAddr);
+pub struct ClientAddress(pub IpAddr);
 
 impl ClientAddress {
     /// The client at a peer's address.
-    pub(crate) fn of(peer: IpAddr) -> Self {
+    pub fn of(peer: IpAddr) -> Self {
         Self(match peer.to_canonical() {
             IpAddr::V6(address) => Ipv6Addr::from_bits(address.to_bits() & NETWORK_BITS).into(),
             address => address,

@@ -15,6 +15,9 @@ const DEFAULT_CONNECTIONS: usize = 1024;
 /// Files that the process opens beside connections.
 const OTHER_FILES: usize = 32;
 
+/// Memory of a machine that does not say.
+const UNKNOWN_MEMORY: usize = 4 << 30;
+
 /// Serve HTTP and gRPC.
 #[derive(Debug, Clone, Args)]
 pub struct ServeArgs {
@@ -63,6 +66,15 @@ pub struct ServeArgs {
     /// Longest time a scan may wait and be mended, such as 30s or 500ms
     #[arg(long, env = "DARN_DEADLINE", value_name = "TIME", default_value = "60s", value_parser = duration)]
     pub deadline: Duration,
+
+    /// CPU time that any request may take; requests with more than 50 KB may take 40 microseconds a byte
+    #[arg(long, env = "DARN_WORK", value_name = "TIME", default_value = "2s", value_parser = duration)]
+    pub work: Duration,
+
+    /// Memory that bodies, jobs and answers may take together, such as 4GiB; left out, half of the machine's, or of what its control group
+    /// allows
+    #[arg(long, env = "DARN_MEMORY", value_name = "SIZE", value_parser = size)]
+    pub memory: Option<usize>,
 
     /// Largest request body, such as 64MiB
     #[arg(long, env = "DARN_BODY_LIMIT", value_name = "SIZE", default_value = "128MiB", value_parser = size)]
@@ -122,6 +134,11 @@ impl ServeArgs {
         })
     }
 
+    /// Memory for bodies, jobs and answers. Without a setting half of the machine's.
+    pub fn memory(&self) -> usize {
+        self.memory.unwrap_or_else(|| machine_memory() / 2)
+    }
+
     /// Connections open at once. Without a setting 1024, or what the files leave that the process may open.
     pub fn connections(&self) -> usize {
         self.connections.unwrap_or_else(|| {
@@ -136,6 +153,28 @@ impl ServeArgs {
         self.uploads
             .unwrap_or_else(|| (4 * (self.workers() + self.queue)).min(MAX_WAITING))
     }
+}
+
+/// Bytes of memory of the machine, or what its control group allows where that is less; 4 GiB where the system says neither.
+fn machine_memory() -> usize {
+    let kibibytes = |text: String| -> Option<usize> {
+        let row = text
+            .lines()
+            .find_map(|line| line.strip_prefix("MemTotal:"))?;
+        row.split_whitespace().next()?.parse().ok()
+    };
+    let machine = std::fs::read_to_string("/proc/meminfo").ok();
+    let machine = machine.and_then(kibibytes).map(|kib| kib << 10);
+    // Version 2 of control groups, then version 1; "max" or a number beyond the machine's means no limit.
+    let groups = [
+        "/sys/fs/cgroup/memory.max",
+        "/sys/fs/cgroup/memory/memory.limit_in_bytes",
+    ];
+    let group = groups.iter().find_map(|path| {
+        let text = std::fs::read_to_string(path).ok()?;
+        text.trim().parse::<usize>().ok()
+    });
+    (machine.into_iter().chain(group).min()).unwrap_or(UNKNOWN_MEMORY)
 }
 
 fn workers(text: &str) -> Result<usize, String> {

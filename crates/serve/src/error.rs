@@ -122,6 +122,14 @@ pub enum RequestError {
         /// Suggested seconds to wait.
         retry_after: u64,
     },
+    /// Bodies, jobs and answers take all memory.
+    #[error(
+        "bodies, jobs and answers take the {} MiB of memory of this service (DARN_MEMORY); try again", .limit >> 20
+    )]
+    MemoryFull {
+        /// Most bytes that they may take together.
+        limit: usize,
+    },
     /// The service shuts down.
     #[error("the service is shutting down")]
     Draining,
@@ -206,6 +214,7 @@ impl RequestError {
             },
             Self::QueueFull { .. } => codes::QUEUE_FULL,
             Self::UploadsFull { .. } | Self::UploadShareFull { .. } => codes::UPLOADS_FULL,
+            Self::MemoryFull { .. } => codes::MEMORY_FULL,
             Self::Draining => codes::DRAINING,
             Self::WarmingUp => codes::WARMING_UP,
             Self::Deadline { .. } => codes::DEADLINE_EXCEEDED,
@@ -228,7 +237,11 @@ impl RequestError {
             Self::QueueFull { retry_after, .. }
             | Self::UploadsFull { retry_after, .. }
             | Self::UploadShareFull { retry_after, .. } => Some(*retry_after),
-            Self::Draining | Self::WarmingUp | Self::Session(SessionError::Full { .. }) => Some(5),
+            Self::Draining
+            | Self::WarmingUp
+            | Self::MemoryFull { .. }
+            | Self::Session(SessionError::Full { .. }) => Some(5),
+            Self::Refused(refusal) if refusal.code == codes::MEMORY_FULL => Some(5),
             Self::Session(SessionError::Busy { .. }) => Some(1),
             _ => None,
         }

@@ -6,16 +6,19 @@ use std::{
     task::{Context, Poll},
 };
 
-use bytes::{Bytes, BytesMut};
+use bytes::Bytes;
 use tonic::{Code, Request, Response, Status, Streaming, codegen::tokio_stream::Stream};
 
 use super::generated::darn_server::{Darn, DarnServer};
 use super::{
     app::App,
     body::{BodyTimer, ScanRequest},
+    client_address::ClientAddress,
+    counted::CountedBytes,
     error::RequestError,
     parameters::Parameters,
     telemetry::RequestId,
+    uploads::BodySize,
 };
 use darn_contract::port::Mended;
 use darn_contract::{
@@ -48,7 +51,7 @@ impl Darn for GrpcService {
         request: Request<Streaming<ScanChunk>>,
     ) -> Result<Response<HolesReport>, Status> {
         let id = request_id(&request);
-        self.holes(request.into_inner())
+        self.holes(request)
             .await
             .map(Response::new)
             .map_err(|error| error.grpc(&id))
@@ -59,10 +62,7 @@ impl Darn for GrpcService {
         request: Request<Streaming<ScanChunk>>,
     ) -> Result<Response<MendedStream>, Status> {
         let id = request_id(&request);
-        let mended = self
-            .mend(request.into_inner())
-            .await
-            .map_err(|error| error.grpc(&id))?;
+        let mended = self.mend(request).await.map_err(|error| error.grpc(&id))?;
         Ok(Response::new(MendedStream::of(mended)))
     }
 
@@ -71,7 +71,7 @@ impl Darn for GrpcService {
         request: Request<Streaming<ScanChunk>>,
     ) -> Result<Response<AnchorFound>, Status> {
         let id = request_id(&request);
-        self.search(request.into_inner())
+        self.search(request)
             .await
             .map(Response::new)
             .map_err(|error| error.grpc(&id))
@@ -79,42 +79,50 @@ impl Darn for GrpcService {
 }
 
 impl GrpcService {
-    async fn holes(&self, stream: Streaming<ScanChunk>) -> Result<HolesReport, RequestError> {
-        let received = self.receive(stream).await?;
+    async fn holes(
+        &self,
+        request: Request<Streaming<ScanChunk>>,
+    ) -> Result<HolesReport, RequestError> {
+        let received = self.receive(request).await?;
         let ScanRequest { scan, upload, .. } = received.without_constraints()?;
         self.0
-            .submit(upload, move |mender, _| mender.find_holes(scan))
+            .submit(upload, scan.len(), move |mender, budget| {
+                mender.find_holes(scan, budget)
+            })
             .await
     }
 
-    async fn mend(&self, stream: Streaming<ScanChunk>) -> Result<Mended, RequestError> {
+    async fn mend(&self, request: Request<Streaming<ScanChunk>>) -> Result<Mended, RequestError> {
         let ScanRequest {
             scan,
             parameters,
             upload,
-        } = self.receive::<Constraints>(stream).await?;
+        } = self.receive::<Constraints>(request).await?;
         let constraints = parameters.unwrap_or_default();
         let mended = self
             .0
-            .submit(upload, move |mender, cancellation| {
-                mender.inpaint(scan, &constraints, cancellation)
+            .submit(upload, scan.len(), move |mender, budget| {
+                mender.inpaint(scan, &constraints, budget)
             })
             .await?;
         self.0.metrics.mended(&mended.report);
         Ok(mended)
     }
 
-    async fn search(&self, stream: Streaming<ScanChunk>) -> Result<AnchorFound, RequestError> {
+    async fn search(
+        &self,
+        request: Request<Streaming<ScanChunk>>,
+    ) -> Result<AnchorFound, RequestError> {
         let ScanRequest {
             scan,
             parameters,
             upload,
-        } = self.receive::<Search>(stream).await?;
+        } = self.receive::<Search>(request).await?;
         let place = "the field `query` of the first chunk";
         let search = parameters.ok_or(RequestError::NoQuery { place })?;
         self.0
-            .submit(upload, move |mender, cancellation| {
-                mender.optimize_anchor(scan, &search, cancellation)
+            .submit(upload, scan.len(), move |mender, budget| {
+                mender.optimize_anchor(scan, &search, budget)
             })
             .await
     }
@@ -122,13 +130,15 @@ impl GrpcService {
     /// Reads the chunks of a request.
     async fn receive<P: ChunkParameters>(
         &self,
-        mut stream: Streaming<ScanChunk>,
+        request: Request<Streaming<ScanChunk>>,
     ) -> Result<ScanRequest<P>, RequestError> {
-        let upload = self.0.upload_permit()?;
+        let client = request.extensions().get::<ClientAddress>().copied();
+        let mut stream = request.into_inner();
+        let upload = self.0.upload_permit_for(BodySize::Large, client)?;
         let limit = self.0.limits.body;
         let timer = BodyTimer::new(&self.0.limits);
         let mut parameters = None;
-        let mut scan = BytesMut::new();
+        let mut scan = CountedBytes::new(&self.0.limits.memory)?;
         let mut first = true;
         while let Some(mut chunk) = timer
             .next(stream.message())
@@ -152,10 +162,10 @@ impl GrpcService {
             if scan.len() + chunk.data.len() > limit {
                 return Err(RequestError::TooLarge { limit });
             }
-            scan.extend_from_slice(&chunk.data);
+            scan.extend(&chunk.data)?;
             first = false;
         }
-        if scan.is_empty() {
+        if scan.len() == 0 {
             return Err(RequestError::EmptyBody);
         }
         Ok(ScanRequest {

@@ -4,14 +4,11 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use tokio::{
-    sync::{OwnedSemaphorePermit, oneshot},
-    time::Instant,
-};
+use tokio::{sync::oneshot, time::Instant};
 use tracing::{Span, warn};
 
-use super::telemetry::PoolMetrics;
-use darn_contract::port::Cancellation;
+use super::{pool::QueuePermit, telemetry::PoolMetrics};
+use darn_budget::{Budget, Limits};
 
 /// Why a job has no result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -37,15 +34,15 @@ pub enum PoolError {
     Panicked,
 }
 
-/// A place in the queue, or at a worker; given back when dropped.
-#[derive(Debug)]
-pub struct QueuePermit(#[allow(dead_code, reason = "held for its drop")] OwnedSemaphorePermit);
-
-impl QueuePermit {
-    /// The place that a permit of the pool's semaphore stands for.
-    pub fn new(permit: OwnedSemaphorePermit) -> Self {
-        Self(permit)
-    }
+/// What a job is ordered by, and its limits.
+#[derive(Debug, Clone)]
+pub struct JobOrder {
+    /// Its estimated cost, in any unit that all jobs share.
+    pub cost: u64,
+    /// When its result comes too late.
+    pub deadline: Instant,
+    /// What it may cost; its deadline is set by the pool.
+    pub limits: Limits,
 }
 
 /// A job with any type of result, as the queue sees it.
@@ -66,6 +63,8 @@ pub struct Job<T, W> {
     pub reply: oneshot::Sender<Result<T, PoolError>>,
     /// When its result comes too late.
     pub deadline: Instant,
+    /// What it may cost.
+    pub limits: Limits,
     /// When it was queued.
     pub queued_at: Instant,
     /// The log span of its request.
@@ -79,7 +78,7 @@ fn is_waited_for<R>(reply: &oneshot::Sender<R>, deadline: Instant) -> bool {
     !reply.is_closed() && Instant::now() < deadline
 }
 
-impl<T: Send, W: FnOnce(Cancellation<'_>) -> T + Send> QueuedJob for Job<T, W> {
+impl<T: Send, W: FnOnce(&Budget<'_>) -> T + Send> QueuedJob for Job<T, W> {
     fn is_wanted(&self) -> bool {
         is_waited_for(&self.reply, self.deadline)
     }
@@ -93,14 +92,19 @@ impl<T: Send, W: FnOnce(Cancellation<'_>) -> T + Send> QueuedJob for Job<T, W> {
             work,
             reply,
             deadline,
+            limits,
             span,
             permit,
             ..
         } = *self;
         let _entered = span.enter();
         let cancelled = || !is_waited_for(&reply, deadline);
-        let cancellation = Cancellation::new(&cancelled);
-        let mut outcome = catch_unwind(AssertUnwindSafe(|| work(cancellation))).map_err(|_| {
+        let limits = Limits {
+            deadline: Some(deadline.into_std()),
+            ..limits
+        };
+        let budget = Budget::new(limits, &cancelled);
+        let mut outcome = catch_unwind(AssertUnwindSafe(|| work(&budget))).map_err(|_| {
             metrics.panicked.increment(1);
             PoolError::Panicked
         });
@@ -108,7 +112,7 @@ impl<T: Send, W: FnOnce(Cancellation<'_>) -> T + Send> QueuedJob for Job<T, W> {
             // The work may have been cancelled; its refusal must not hide that the deadline passed.
             outcome = Err(PoolError::Expired);
         }
-        drop(permit);
+        drop((permit, budget));
         if reply.send(outcome).is_err() {
             metrics.discarded.increment(1);
             warn!("nobody waited for the result any more");

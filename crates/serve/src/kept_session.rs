@@ -4,7 +4,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use darn_contract::port::{Cancellation, EditSession, Mended, PatchForm, Patches, Refusal};
+use darn_budget::Budget;
+use darn_contract::port::{EditSession, Mended, PatchForm, Patches, Refusal};
 use darn_contract::{Anchor, Constraints, Edit, Search, v1};
 
 /// Bytes a session takes beside its scan.
@@ -41,10 +42,10 @@ impl KeptSession {
         &self,
         constraints: &Constraints,
         form: PatchForm,
-        cancellation: Cancellation<'_>,
+        budget: &Budget<'_>,
     ) -> Result<Patches, Refusal> {
-        let patches = self.session.patches(constraints, form, cancellation)?;
-        if !cancellation.is_cancelled() {
+        let patches = self.session.patches(constraints, form, budget)?;
+        if budget.check().is_ok() {
             *self.last() = constraints.clone();
         }
         Ok(patches)
@@ -54,9 +55,9 @@ impl KeptSession {
     ///
     /// # Errors
     /// The mender's refusal.
-    pub fn result(&self, cancellation: Cancellation<'_>) -> Result<Mended, Refusal> {
+    pub fn result(&self, budget: &Budget<'_>) -> Result<Mended, Refusal> {
         let last = self.last().clone();
-        self.session.mended(&last, cancellation)
+        self.session.mended(&last, budget)
     }
 
     /// Searches the uv of a hole's grid for a point.
@@ -66,9 +67,9 @@ impl KeptSession {
     pub fn optimize_anchor(
         &self,
         search: &Search,
-        cancellation: Cancellation<'_>,
+        budget: &Budget<'_>,
     ) -> Result<v1::AnchorFound, Refusal> {
-        self.session.optimize_anchor(search, cancellation)
+        self.session.optimize_anchor(search, budget)
     }
 
     /// Waits for exclusive use, in order of arrival, until the permit is dropped. Blocks no thread.

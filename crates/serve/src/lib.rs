@@ -13,8 +13,10 @@ mod client_address;
 mod config;
 mod connection_table;
 mod connections;
+mod counted;
 mod ended_sessions;
 mod error;
+mod fair_queue;
 /// The gRPC service of `proto/darn/v1/darn.proto` and a client of it, as generated.
 #[allow(missing_docs, clippy::all, clippy::pedantic, rustdoc::all)]
 pub mod generated {

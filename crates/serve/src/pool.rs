@@ -1,10 +1,10 @@
 //! A bounded queue in front of a few blocking worker threads. Runs closures; knows no HTTP and no scans.
 //!
-//! Jobs start in the order in which they were queued. A job whose caller left or whose deadline passed is skipped; one that already
-//! runs sees its cancellation.
+//! A [`FairQueue`] says which job starts next. A job whose caller left or whose deadline passed is skipped; one that already
+//! runs sees its budget.
 
 use std::{
-    collections::VecDeque,
+    collections::HashMap,
     io,
     sync::{
         Arc, Condvar, Mutex, MutexGuard, PoisonError,
@@ -15,19 +15,22 @@ use std::{
 };
 
 use tokio::{
-    sync::{Semaphore, oneshot},
+    sync::oneshot,
     time::{Instant, timeout_at},
 };
 use tracing::Span;
 
 use super::{
-    job::{Job, PoolError, QueuePermit, QueuedJob},
+    fair_queue::{Client, FairQueue},
+    job::{Job, JobOrder, PoolError, QueuedJob},
     telemetry::PoolMetrics,
 };
-use darn_contract::port::Cancellation;
+use darn_budget::Budget;
 
 /// Longest wait suggested to a caller, in seconds.
 const MAX_RETRY_AFTER: u64 = 120;
+/// One client leaves one in this many places, and as many workers, to others.
+const SHARE_OF_OTHERS: usize = 4;
 
 /// The queue and its workers. Dropping it closes the queue; running jobs run to their end.
 #[derive(Debug)]
@@ -37,7 +40,10 @@ pub struct Pool(Arc<Shared>);
 struct Shared {
     queue: Mutex<Queue>,
     filled: Condvar,
-    places: Arc<Semaphore>,
+    /// Places in the queue and at the workers together.
+    places: usize,
+    /// Most places that one client may take.
+    places_per_client: usize,
     workers: usize,
     running: AtomicUsize,
     /// Moving average of the jobs' run time, in microseconds; 0 before the first.
@@ -45,10 +51,32 @@ struct Shared {
     metrics: PoolMetrics,
 }
 
-#[derive(Default)]
 struct Queue {
-    jobs: VecDeque<Box<dyn QueuedJob>>,
+    jobs: FairQueue<Box<dyn QueuedJob>>,
+    /// Places taken, in all and by each client.
+    taken: usize,
+    taken_by: HashMap<Client, usize>,
     closed: bool,
+}
+
+/// A place in the queue, or at a worker; given back when dropped.
+#[derive(Debug)]
+pub struct QueuePermit {
+    shared: Arc<Shared>,
+    client: Client,
+}
+
+impl Drop for QueuePermit {
+    fn drop(&mut self) {
+        let mut queue = self.shared.lock();
+        queue.taken -= 1;
+        if let Some(taken) = queue.taken_by.get_mut(&self.client) {
+            *taken -= 1;
+            if *taken == 0 {
+                queue.taken_by.remove(&self.client);
+            }
+        }
+    }
 }
 
 impl std::fmt::Debug for Queue {
@@ -67,10 +95,17 @@ impl Pool {
     /// When a thread cannot be started.
     pub fn start(workers: usize, queue: usize, metrics: PoolMetrics) -> io::Result<Self> {
         let workers = workers.max(1);
+        let places = workers + queue;
         let shared = Arc::new(Shared {
-            queue: Mutex::default(),
+            queue: Mutex::new(Queue {
+                jobs: FairQueue::new(workers - workers / SHARE_OF_OTHERS),
+                taken: 0,
+                taken_by: HashMap::new(),
+                closed: false,
+            }),
             filled: Condvar::new(),
-            places: Arc::new(Semaphore::new(workers + queue)),
+            places,
+            places_per_client: places - places / SHARE_OF_OTHERS,
             workers,
             running: AtomicUsize::new(0),
             mean_run_time: AtomicU64::new(0),
@@ -86,39 +121,27 @@ impl Pool {
         Ok(pool)
     }
 
-    /// Checks that a place is free now; takes none.
+    /// Checks that a place is free for a client now; takes none.
     ///
     /// # Errors
     /// `Full` with an estimate, or `Closed`.
-    pub fn check_capacity(&self) -> Result<(), PoolError> {
-        if self.0.lock().closed {
-            return Err(PoolError::Closed);
-        }
-        if self.0.places.available_permits() == 0 {
-            self.0.drop_abandoned();
-        }
-        match self.0.places.available_permits() {
-            0 => Err(self.0.full()),
-            _ => Ok(()),
-        }
+    pub fn check_capacity(&self, client: Client) -> Result<(), PoolError> {
+        self.0.with_place(client, |_| ())
     }
 
     /// Takes a place for a job.
     ///
     /// # Errors
     /// `Full` with an estimate, or `Closed`.
-    pub fn reserve(&self) -> Result<QueuePermit, PoolError> {
-        if self.0.lock().closed {
-            return Err(PoolError::Closed);
-        }
-        let take = || Arc::clone(&self.0.places).try_acquire_owned();
-        take()
-            .or_else(|_| {
-                self.0.drop_abandoned();
-                take()
-            })
-            .map(QueuePermit::new)
-            .map_err(|_| self.0.full())
+    pub fn reserve(&self, client: Client) -> Result<QueuePermit, PoolError> {
+        self.0.with_place(client, |queue| {
+            queue.taken += 1;
+            *queue.taken_by.entry(client).or_default() += 1;
+        })?;
+        Ok(QueuePermit {
+            shared: Arc::clone(&self.0),
+            client,
+        })
     }
 
     /// Queues a job at once; the future waits for its result, until the deadline. Dropping the future skips a job that has not begun,
@@ -129,18 +152,26 @@ impl Pool {
     pub fn run<T: Send + 'static>(
         &self,
         permit: QueuePermit,
-        deadline: Instant,
-        work: impl FnOnce(Cancellation<'_>) -> T + Send + 'static,
+        order: JobOrder,
+        work: impl FnOnce(&Budget<'_>) -> T + Send + 'static,
     ) -> impl Future<Output = Result<T, PoolError>> {
         let (reply, answer) = oneshot::channel();
-        let pushed = self.0.push(Box::new(Job {
+        let JobOrder {
+            cost,
+            deadline,
+            limits,
+        } = order;
+        let client = permit.client;
+        let job = Job {
             work,
             reply,
             deadline,
+            limits,
             queued_at: Instant::now(),
             span: Span::current(),
             permit,
-        }));
+        };
+        let pushed = self.0.push(client, cost, Box::new(job));
         async move {
             pushed?;
             match timeout_at(deadline, answer).await {
@@ -169,28 +200,50 @@ impl Shared {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn push(&self, job: Box<dyn QueuedJob>) -> Result<(), PoolError> {
+    fn push(&self, client: Client, cost: u64, job: Box<dyn QueuedJob>) -> Result<(), PoolError> {
         let mut queue = self.lock();
         if queue.closed {
+            // Not under the lock: the job's place locks the queue when it is given back.
+            drop(queue);
             return Err(PoolError::Closed);
         }
-        queue.jobs.push_back(job);
+        queue.jobs.push(client, cost, job);
         self.metrics.waiting.set(queue.jobs.len() as f64);
         drop(queue);
         self.filled.notify_one();
         Ok(())
     }
 
+    /// Calls `take` if a place is free for a client; drops the jobs of callers who left if there is none.
+    fn with_place(&self, client: Client, take: impl FnOnce(&mut Queue)) -> Result<(), PoolError> {
+        let is_free = |queue: &Queue| {
+            let taken_by = queue.taken_by.get(&client).copied().unwrap_or_default();
+            queue.taken < self.places && taken_by < self.places_per_client
+        };
+        if !is_free(&self.lock()) {
+            self.drop_abandoned();
+        }
+        let mut queue = self.lock();
+        if queue.closed {
+            return Err(PoolError::Closed);
+        }
+        if !is_free(&queue) {
+            drop(queue);
+            return Err(self.full());
+        }
+        take(&mut queue);
+        Ok(())
+    }
+
     /// Drops jobs nobody waits for any more.
     fn drop_abandoned(&self) {
         let mut queue = self.lock();
-        let (kept, abandoned): (VecDeque<_>, VecDeque<_>) = std::mem::take(&mut queue.jobs)
-            .into_iter()
-            .partition(|job| job.is_wanted());
-        queue.jobs = kept;
+        let abandoned = queue.jobs.take_unwanted(|job| job.is_wanted());
         self.metrics.waiting.set(queue.jobs.len() as f64);
+        // Not under the lock: their places lock the queue when they are given back.
         drop(queue);
         self.metrics.skipped.increment(abandoned.len() as u64);
+        drop(abandoned);
     }
 
     /// The error of a full queue, with an estimate of when a place is free.
@@ -207,14 +260,14 @@ impl Shared {
     }
 
     /// Waits for the next job; `None` once the queue is closed and empty.
-    fn next(&self) -> Option<Box<dyn QueuedJob>> {
+    fn next(&self) -> Option<(Client, Box<dyn QueuedJob>)> {
         let mut queue = self.lock();
         loop {
-            if let Some(job) = queue.jobs.pop_front() {
+            if let Some(next) = queue.jobs.pop() {
                 self.metrics.waiting.set(queue.jobs.len() as f64);
-                return Some(job);
+                return Some(next);
             }
-            if queue.closed {
+            if queue.closed && queue.jobs.len() == 0 {
                 return None;
             }
             queue = self
@@ -226,24 +279,31 @@ impl Shared {
 
     /// A worker thread: runs jobs until the queue is closed and empty.
     fn run_jobs(&self) {
-        while let Some(job) = self.next() {
-            if !job.is_wanted() {
-                self.metrics.skipped.increment(1);
-                continue;
-            }
-            self.metrics
-                .running
-                .set((self.running.fetch_add(1, Relaxed) + 1) as f64);
-            let begun = Instant::now();
-            self.metrics
-                .waited
-                .record(begun.duration_since(job.queued_at()).as_secs_f64());
-            job.run(&self.metrics);
-            self.record_run_time(begun.elapsed());
-            self.metrics
-                .running
-                .set((self.running.fetch_sub(1, Relaxed) - 1) as f64);
+        while let Some((client, job)) = self.next() {
+            self.run_job(job);
+            self.lock().jobs.ended(client);
+            // Jobs of this client may have waited for it to end, and workers for such jobs.
+            self.filled.notify_all();
         }
+    }
+
+    fn run_job(&self, job: Box<dyn QueuedJob>) {
+        if !job.is_wanted() {
+            self.metrics.skipped.increment(1);
+            return;
+        }
+        self.metrics
+            .running
+            .set((self.running.fetch_add(1, Relaxed) + 1) as f64);
+        let begun = Instant::now();
+        self.metrics
+            .waited
+            .record(begun.duration_since(job.queued_at()).as_secs_f64());
+        job.run(&self.metrics);
+        self.record_run_time(begun.elapsed());
+        self.metrics
+            .running
+            .set((self.running.fetch_sub(1, Relaxed) - 1) as f64);
     }
 
     fn record_run_time(&self, took: Duration) {

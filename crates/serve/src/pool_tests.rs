@@ -1,8 +1,11 @@
-//! Tests of the pool: order, limits, deadlines, cancellation, panics.
+//! Tests of the pool: order, limits, deadlines, budget, panics.
 
 use std::sync::mpsc;
 
+use darn_budget::Limits;
+
 use super::*;
+use crate::client_address::ClientAddress;
 use crate::telemetry::Metrics;
 
 fn pool(workers: usize, queue: usize) -> Pool {
@@ -13,15 +16,24 @@ fn soon() -> Instant {
     Instant::now() + Duration::from_secs(20)
 }
 
+/// A job that costs 1 and has no limits but its deadline.
+fn by(deadline: Instant) -> JobOrder {
+    JobOrder {
+        cost: 1,
+        deadline,
+        limits: Limits::default(),
+    }
+}
+
 /// A job that reports when it has begun, and runs until it is released.
 fn held() -> (
-    impl FnOnce(Cancellation<'_>) + Send + 'static,
+    impl FnOnce(&Budget<'_>) + Send + 'static,
     mpsc::Receiver<()>,
     mpsc::Sender<()>,
 ) {
     let (begun, has_begun) = mpsc::channel();
     let (release, released) = mpsc::channel::<()>();
-    let work = move |_: Cancellation<'_>| {
+    let work = move |_: &Budget<'_>| {
         begun.send(()).ok();
         released.recv().ok();
     };
@@ -32,21 +44,21 @@ fn held() -> (
 async fn a_full_pool_refuses_and_frees_the_places_of_callers_who_left() {
     let pool = Arc::new(pool(1, 1));
     let (work, begun, release) = held();
-    let first = pool.reserve().unwrap();
+    let first = pool.reserve(None).unwrap();
     let running = tokio::spawn({
         let pool = Arc::clone(&pool);
-        async move { pool.run(first, soon(), work).await }
+        async move { pool.run(first, by(soon()), work).await }
     });
     tokio::task::spawn_blocking(move || begun.recv())
         .await
         .unwrap()
         .unwrap();
 
-    let second = pool.reserve().unwrap();
-    let mut waiting = Box::pin(pool.run(second, soon(), |_| panic!("must be skipped")));
+    let second = pool.reserve(None).unwrap();
+    let mut waiting = Box::pin(pool.run(second, by(soon()), |_| panic!("must be skipped")));
     assert!(poll_once(&mut waiting).await.is_none());
     assert_eq!(
-        pool.reserve().unwrap_err(),
+        pool.reserve(None).unwrap_err(),
         PoolError::Full {
             waiting: 1,
             running: 1,
@@ -55,17 +67,17 @@ async fn a_full_pool_refuses_and_frees_the_places_of_callers_who_left() {
     );
 
     drop(waiting);
-    let third = pool.reserve().unwrap();
+    let third = pool.reserve(None).unwrap();
     release.send(()).unwrap();
     assert_eq!(running.await.unwrap(), Ok(()));
-    assert_eq!(pool.run(third, soon(), |_| 7).await, Ok(7));
+    assert_eq!(pool.run(third, by(soon()), |_| 7).await, Ok(7));
 }
 
 #[tokio::test]
 async fn jobs_start_in_the_order_they_were_queued() {
-    let pool = pool(1, 8);
+    let pool = pool(1, 12);
     let (work, begun, release) = held();
-    let mut first = Box::pin(pool.run(pool.reserve().unwrap(), soon(), work));
+    let mut first = Box::pin(pool.run(pool.reserve(None).unwrap(), by(soon()), work));
     assert!(poll_once(&mut first).await.is_none());
     tokio::task::spawn_blocking(move || begun.recv())
         .await
@@ -75,8 +87,8 @@ async fn jobs_start_in_the_order_they_were_queued() {
     let waiting: Vec<_> = (0..8)
         .map(|i| {
             let order = Arc::clone(&order);
-            let work = move |_: Cancellation<'_>| order.lock().unwrap().push(i);
-            pool.run(pool.reserve().unwrap(), soon(), work)
+            let work = move |_: &Budget<'_>| order.lock().unwrap().push(i);
+            pool.run(pool.reserve(None).unwrap(), by(soon()), work)
         })
         .collect();
     release.send(()).unwrap();
@@ -92,12 +104,16 @@ async fn jobs_start_in_the_order_they_were_queued() {
 async fn a_deadline_covers_waiting_and_running() {
     let pool = Arc::new(pool(1, 4));
     let (work, begun, release) = held();
-    let permit = pool.reserve().unwrap();
+    let permit = pool.reserve(None).unwrap();
     let running = tokio::spawn({
         let pool = Arc::clone(&pool);
         async move {
-            pool.run(permit, Instant::now() + Duration::from_millis(200), work)
-                .await
+            pool.run(
+                permit,
+                by(Instant::now() + Duration::from_millis(200)),
+                work,
+            )
+            .await
         }
     });
     tokio::task::spawn_blocking(move || begun.recv())
@@ -107,8 +123,8 @@ async fn a_deadline_covers_waiting_and_running() {
     let (tell, told) = mpsc::channel();
     let waiting = pool
         .run(
-            pool.reserve().unwrap(),
-            Instant::now() + Duration::from_millis(10),
+            pool.reserve(None).unwrap(),
+            by(Instant::now() + Duration::from_millis(10)),
             move |_| {
                 tell.send(()).ok();
             },
@@ -118,7 +134,8 @@ async fn a_deadline_covers_waiting_and_running() {
     assert_eq!(running.await.unwrap(), Err(PoolError::Expired));
     release.send(()).unwrap();
     assert_eq!(
-        pool.run(pool.reserve().unwrap(), soon(), |_| 1).await,
+        pool.run(pool.reserve(None).unwrap(), by(soon()), |_| 1)
+            .await,
         Ok(1)
     );
     assert!(told.try_recv().is_err(), "an expired job must not run");
@@ -129,15 +146,19 @@ async fn a_running_job_is_cancelled_when_nobody_waits() {
     let pool = pool(1, 4);
     let (told, events) = mpsc::channel();
     let working = |told: mpsc::Sender<bool>| {
-        move |cancellation: Cancellation<'_>| {
-            told.send(!cancellation.is_cancelled()).ok();
-            while !cancellation.is_cancelled() {
+        move |budget: &Budget<'_>| {
+            told.send(budget.check().is_ok()).ok();
+            while budget.check().is_ok() {
                 std::thread::yield_now();
             }
             told.send(false).ok();
         }
     };
-    let mut leaving = Box::pin(pool.run(pool.reserve().unwrap(), soon(), working(told.clone())));
+    let mut leaving = Box::pin(pool.run(
+        pool.reserve(None).unwrap(),
+        by(soon()),
+        working(told.clone()),
+    ));
     assert!(poll_once(&mut leaving).await.is_none());
     let events = tokio::task::spawn_blocking(move || {
         assert_eq!(events.recv(), Ok(true));
@@ -147,10 +168,11 @@ async fn a_running_job_is_cancelled_when_nobody_waits() {
     drop(leaving);
     // Its worker is free again. The next job ends because its deadline passes.
     let deadline = Instant::now() + Duration::from_millis(100);
-    let late = pool.run(pool.reserve().unwrap(), deadline, working(told));
+    let late = pool.run(pool.reserve(None).unwrap(), by(deadline), working(told));
     assert_eq!(late.await, Err(PoolError::Expired));
     assert_eq!(
-        pool.run(pool.reserve().unwrap(), soon(), |_| 4).await,
+        pool.run(pool.reserve(None).unwrap(), by(soon()), |_| 4)
+            .await,
         Ok(4)
     );
     assert_eq!(events.iter().collect::<Vec<_>>(), [false, true, false]);
@@ -160,19 +182,22 @@ async fn a_running_job_is_cancelled_when_nobody_waits() {
 async fn a_panic_fails_only_its_job_and_a_closed_pool_finishes_queued_jobs() {
     let pool = pool(1, 4);
     let panicked = pool
-        .run(pool.reserve().unwrap(), soon(), |_| panic!("on purpose"))
+        .run(pool.reserve(None).unwrap(), by(soon()), |_| {
+            panic!("on purpose")
+        })
         .await;
     assert_eq!(panicked, Err::<(), _>(PoolError::Panicked));
     assert_eq!(
-        pool.run(pool.reserve().unwrap(), soon(), |_| 2).await,
+        pool.run(pool.reserve(None).unwrap(), by(soon()), |_| 2)
+            .await,
         Ok(2)
     );
 
-    let last = pool.reserve().unwrap();
-    let mut job = Box::pin(pool.run(last, soon(), |_| 3));
+    let last = pool.reserve(None).unwrap();
+    let mut job = Box::pin(pool.run(last, by(soon()), |_| 3));
     let early = poll_once(&mut job).await;
     pool.close();
-    assert_eq!(pool.reserve().unwrap_err(), PoolError::Closed);
+    assert_eq!(pool.reserve(None).unwrap_err(), PoolError::Closed);
     let outcome = match early {
         Some(outcome) => outcome,
         None => job.await,
@@ -189,4 +214,22 @@ async fn poll_once<F: Future + Unpin>(future: &mut F) -> Option<F::Output> {
         })
     })
     .await
+}
+
+#[tokio::test]
+async fn one_client_cannot_take_every_place() {
+    let pool = pool(1, 7);
+    let client = |n: u8| {
+        Some(ClientAddress::of(
+            std::net::Ipv4Addr::new(192, 0, 2, n).into(),
+        ))
+    };
+    let flood: Vec<_> = (0..8).map_while(|_| pool.reserve(client(1)).ok()).collect();
+    assert_eq!(flood.len(), 6);
+    assert!(pool.check_capacity(client(1)).is_err());
+    assert!(pool.check_capacity(client(2)).is_ok());
+    let others: Vec<_> = (0..8).map_while(|_| pool.reserve(client(2)).ok()).collect();
+    assert_eq!(others.len(), 2);
+    drop(flood);
+    assert!(pool.reserve(client(1)).is_ok());
 }

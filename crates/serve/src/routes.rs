@@ -21,6 +21,7 @@ use super::{
     accept::preferred,
     app::App,
     body::{self, ScanRequest},
+    counted::counted_answer,
     error::RequestError,
     media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, PROMETHEUS},
     openapi,
@@ -128,6 +129,7 @@ async fn observe(State(app): State<Arc<App>>, mut request: Request, next: Next) 
         response.headers_mut().insert(REQUEST_ID, value);
     }
 
+    let response = response.map(|body| counted_answer(body, &app.limits.memory));
     let status = response.status().as_u16();
     app.metrics.answered(&route, status, started.elapsed());
     let code = error.as_ref().map(|error| error.code().word);
@@ -151,8 +153,8 @@ async fn inpaint(State(app): State<Arc<App>>, request: Request) -> Result<Respon
     } = body::receive_scan::<Constraints>(&app, request).await?;
     let constraints = parameters.unwrap_or_default();
     let service = Arc::clone(&app);
-    app.submit(upload, move |mender, cancellation| {
-        let mended = mender.inpaint(scan, &constraints, cancellation)?;
+    app.submit(upload, scan.len(), move |mender, budget| {
+        let mended = mender.inpaint(scan, &constraints, budget)?;
         Ok(MendResponse::from(mended).render(media_type, &service.metrics))
     })
     .await
@@ -162,8 +164,8 @@ async fn holes(State(app): State<Arc<App>>, request: Request) -> Result<Response
     let received = body::receive_scan(&app, request).await?;
     let ScanRequest { scan, upload, .. } = received.without_constraints()?;
     let text = app
-        .submit(upload, move |mender, _| {
-            Ok(response::json(&mender.find_holes(scan)?))
+        .submit(upload, scan.len(), move |mender, budget| {
+            Ok(response::json(&mender.find_holes(scan, budget)?))
         })
         .await?;
     Ok(response::json_response(text))
@@ -183,16 +185,16 @@ async fn optimize_anchor(
     let search = parameters.ok_or(RequestError::NoQuery { place })?;
     if media_type == JSON {
         let text = app
-            .submit(upload, move |mender, cancellation| {
-                let found = mender.optimize_anchor(scan, &search, cancellation)?;
+            .submit(upload, scan.len(), move |mender, budget| {
+                let found = mender.optimize_anchor(scan, &search, budget)?;
                 Ok(response::json(&found))
             })
             .await?;
         return Ok(response::json_response(text));
     }
     let service = Arc::clone(&app);
-    app.submit(upload, move |mender, cancellation| {
-        let mended = mender.mend_to_target(scan, &search, cancellation)?;
+    app.submit(upload, scan.len(), move |mender, budget| {
+        let mended = mender.mend_to_target(scan, &search, budget)?;
         Ok(MendResponse::from(mended).render(media_type, &service.metrics))
     })
     .await

@@ -60,14 +60,15 @@ async fn open(State(app): State<Arc<App>>, request: Request) -> Result<Response,
     let constraints = parameters::only_selection(parameters.unwrap_or_default())?;
     let (id, sessions) = (Uuid::new_v4(), Arc::clone(&app.sessions));
     let idle_seconds = sessions.limits().idle.as_secs_f64();
-    let job = app.submit(upload, move |mender, cancellation| {
-        let session = mender.open(scan, &constraints, cancellation)?;
+    let client = upload.client();
+    let job = app.submit(upload, scan.len(), move |mender, budget| {
+        let session = mender.open(scan, &constraints, budget)?;
         let text = session_json(session.described(), id, idle_seconds);
         Ok((session, text))
     });
     // Inserted only while the caller still waits: an abandoned session must not evict another.
     let (session, text) = job.await?;
-    run_blocking(move || sessions.insert(id, session, Instant::now())).await?;
+    run_blocking(move || sessions.insert(id, client, session, Instant::now())).await?;
     let headers = [
         (header::CONTENT_TYPE, JSON.to_owned()),
         (header::LOCATION, format!("/sessions/{id}")),
@@ -104,8 +105,8 @@ async fn inpaint(
     let SessionRequest { parameters, upload } = receive::<Constraints>(&app, id, request).await?;
     let constraints = parameters::only_edits(parameters.unwrap_or_default())?;
     let service = Arc::clone(&app);
-    app.submit_to_session(id, upload, move |session, cancellation| {
-        let patches = session.patches(&constraints, form, cancellation)?;
+    app.submit_to_session(id, upload, move |session, budget| {
+        let patches = session.patches(&constraints, form, budget)?;
         Ok(MendResponse::of_patches(patches, form).render(media_type, &service.metrics))
     })
     .await
@@ -120,9 +121,9 @@ async fn optimize_anchor(
     let place = "the body, application/json";
     let search = parameters.ok_or(RequestError::NoQuery { place })?;
     let text = app
-        .submit_to_session(id, upload, move |session, cancellation| {
+        .submit_to_session(id, upload, move |session, budget| {
             session
-                .optimize_anchor(&search, cancellation)
+                .optimize_anchor(&search, budget)
                 .map(|found| response::json(&found))
         })
         .await?;
@@ -137,8 +138,8 @@ async fn result(
     let media_type = preferred(request.headers(), &[GLB, GLTF, MULTIPART_MIXED]);
     let upload = session_permit(&app, id, &request)?;
     let service = Arc::clone(&app);
-    app.submit_to_session(id, upload, move |session, cancellation| {
-        let mended = session.result(cancellation)?;
+    app.submit_to_session(id, upload, move |session, budget| {
+        let mended = session.result(budget)?;
         Ok(MendResponse::from(mended).render(media_type, &service.metrics))
     })
     .await

@@ -15,6 +15,7 @@ use uuid::Uuid;
 
 use super::{
     ended_sessions::{EndReason, EndedSessions},
+    fair_queue::Client,
     kept_session::KeptSession,
     telemetry::SessionMetrics,
 };
@@ -23,6 +24,9 @@ use darn_contract::port::EditSession;
 /// Most requests for one session at once: one uses it, the others wait. Together with the places of the pool this keeps the number
 /// of waiting requests below that of requests received at once.
 const MAX_LEASES: usize = 4;
+
+/// About the bytes that a session holds for each byte of its scan.
+const HELD_PER_BYTE: usize = 16;
 
 /// Why a session cannot be used or kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -91,6 +95,8 @@ struct StoreState {
 
 struct SessionEntry {
     session: Arc<KeptSession>,
+    /// Who opened it.
+    client: Client,
     bytes: usize,
     leases: usize,
     last_used: Instant,
@@ -123,13 +129,15 @@ impl SessionStore {
         self.limits
     }
 
-    /// Keeps a session under a new id; ends the least recently used sessions whose memory it needs. Blocks while their memory is freed.
+    /// Keeps a client's session under a new id; ends sessions whose memory it needs, first those of the client whose sessions take most. Blocks
+    /// while their memory is freed.
     ///
     /// # Errors
     /// `TooLarge` or `Full`; then no session was ended to make room.
     pub fn insert(
         &self,
         id: Uuid,
+        client: Client,
         session: Box<dyn EditSession>,
         now: Instant,
     ) -> Result<(), SessionError> {
@@ -152,6 +160,7 @@ impl SessionStore {
         state.bytes += bytes;
         let entry = SessionEntry {
             session,
+            client,
             bytes,
             leases: 0,
             last_used: now,
@@ -314,11 +323,12 @@ impl StoreState {
         Some(entry.session)
     }
 
-    /// Ends least recently used sessions until all take at most `limit` bytes, or only leased ones are left.
+    /// Ends sessions until all take at most `limit` bytes, or only leased ones are left: of the client whose unleased sessions take most the
+    /// least recently used one. So a client with many sessions ends its own, and not those of others.
     fn evict(&mut self, limit: usize, metrics: &SessionMetrics) -> Vec<Arc<KeptSession>> {
         let mut ended = Vec::new();
         while self.bytes > limit {
-            let Some((_, &id)) = self.unleased.first_key_value() else {
+            let Some(id) = self.first_to_end() else {
                 break;
             };
             ended.extend(self.remove(id));
@@ -326,6 +336,24 @@ impl StoreState {
             metrics.evicted.increment(1);
         }
         ended
+    }
+
+    /// The least recently used session of the client whose unleased sessions take most memory.
+    fn first_to_end(&self) -> Option<Uuid> {
+        let mut bytes: HashMap<Client, usize> = HashMap::new();
+        // In order of use, so that of clients with equally much the least recently used one is met first.
+        let unleased = || {
+            self.unleased
+                .values()
+                .filter_map(|id| Some((id, self.live.get(id)?)))
+        };
+        for (_, entry) in unleased() {
+            *bytes.entry(entry.client).or_default() += entry.bytes;
+        }
+        let most = bytes.values().copied().max()?;
+        unleased()
+            .find(|(_, entry)| bytes.get(&entry.client) == Some(&most))
+            .map(|(id, _)| *id)
     }
 
     /// Ends the sessions that were idle for too long; `unleased` is in order of last use.
@@ -383,6 +411,11 @@ pub struct SessionGuard {
 }
 
 impl SessionGuard {
+    /// About the bytes of the session's scan.
+    pub fn scan_bytes(&self) -> usize {
+        self.lease.session.bytes() / HELD_PER_BYTE
+    }
+
     /// Runs `job` on the session, then updates the memory it takes.
     pub fn run<T>(&self, job: impl FnOnce(&KeptSession) -> T) -> T {
         let session = &self.lease.session;

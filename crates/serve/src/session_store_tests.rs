@@ -6,9 +6,11 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use proptest::prelude::*;
 
 use super::*;
+use crate::client_address::ClientAddress;
 use crate::kept_session::OVERHEAD;
 use crate::telemetry::Metrics;
-use darn_contract::port::{Cancellation, Mended, PatchForm, Patches, Refusal};
+use darn_budget::{Budget, Limits};
+use darn_contract::port::{Mended, PatchForm, Patches, Refusal};
 use darn_contract::{Anchor, Constraints, Search, v1};
 
 const IDLE: Duration = Duration::from_secs(60);
@@ -34,18 +36,13 @@ impl EditSession for SizedSession {
         self.bytes.load(Relaxed)
     }
 
-    fn patches(
-        &self,
-        _: &Constraints,
-        _: PatchForm,
-        _: Cancellation<'_>,
-    ) -> Result<Patches, Refusal> {
+    fn patches(&self, _: &Constraints, _: PatchForm, _: &Budget<'_>) -> Result<Patches, Refusal> {
         let report = v1::Report::default();
         let bytes = Vec::new();
         Ok(Patches { bytes, report })
     }
 
-    fn mended(&self, constraints: &Constraints, _: Cancellation<'_>) -> Result<Mended, Refusal> {
+    fn mended(&self, constraints: &Constraints, _: &Budget<'_>) -> Result<Mended, Refusal> {
         let bytes = vec![0; constraints.anchors.len()];
         let report = v1::Report::default();
         Ok(Mended {
@@ -55,7 +52,7 @@ impl EditSession for SizedSession {
         })
     }
 
-    fn optimize_anchor(&self, _: &Search, _: Cancellation<'_>) -> Result<v1::AnchorFound, Refusal> {
+    fn optimize_anchor(&self, _: &Search, _: &Budget<'_>) -> Result<v1::AnchorFound, Refusal> {
         Ok(v1::AnchorFound::default())
     }
 }
@@ -64,6 +61,8 @@ impl EditSession for SizedSession {
 struct TestStore {
     sessions: Arc<SessionStore>,
     alive: Arc<AtomicUsize>,
+    /// Who opens the next sessions.
+    client: Client,
     now: Instant,
 }
 
@@ -73,6 +72,7 @@ impl TestStore {
         Self {
             sessions: SessionStore::new(limits, Metrics::new().unwrap().sessions()),
             alive: Arc::default(),
+            client: None,
             now: Instant::now(),
         }
     }
@@ -86,7 +86,9 @@ impl TestStore {
             alive: Arc::clone(&self.alive),
         };
         let id = Uuid::new_v4();
-        let opened = self.sessions.insert(id, Box::new(session), self.now);
+        let opened = self
+            .sessions
+            .insert(id, self.client, Box::new(session), self.now);
         opened.map(|()| (id, size))
     }
 
@@ -256,7 +258,7 @@ fn the_result_has_the_constraints_of_the_last_successful_edit() {
         position: [0.0; 3],
         hard: false,
     };
-    let size = || session.result(Cancellation::NEVER).unwrap().bytes.len();
+    let size = || session.result(Budget::unlimited()).unwrap().bytes.len();
     assert_eq!(size(), 0);
     let constraints = Constraints {
         anchors: vec![anchor; 3],
@@ -264,11 +266,15 @@ fn the_result_has_the_constraints_of_the_last_successful_edit() {
     };
     // The answer of a cancelled call reaches nobody, so its constraints are not remembered.
     session
-        .patches(&constraints, PatchForm::Glb, Cancellation::new(&|| true))
+        .patches(
+            &constraints,
+            PatchForm::Glb,
+            &Budget::new(Limits::default(), &|| true),
+        )
         .unwrap();
     assert_eq!(size(), 0);
     session
-        .patches(&constraints, PatchForm::Glb, Cancellation::NEVER)
+        .patches(&constraints, PatchForm::Glb, Budget::unlimited())
         .unwrap();
     assert_eq!(size(), 3);
     assert!(session.bytes() > 3 * size_of::<Anchor>());
@@ -330,4 +336,22 @@ proptest! {
         store.sessions.end_idle(store.now.max(Instant::now() + IDLE));
         prop_assert_eq!((store.alive(), store.bytes()), (0, 0));
     }
+}
+
+#[test]
+fn a_client_with_many_sessions_ends_its_own_first() {
+    let mut store = TestStore::of(100_000);
+    let client = |n: u8| {
+        Some(ClientAddress::of(
+            std::net::Ipv4Addr::new(192, 0, 2, n).into(),
+        ))
+    };
+    store.client = client(1);
+    let (quiet, _) = store.open(10_000).unwrap();
+    store.client = client(2);
+    let many: Vec<Uuid> = (0..700).map(|_| store.open(2000).unwrap().0).collect();
+    assert_eq!(store.end_of(quiet), None);
+    assert_eq!(store.end_of(many[0]), Some(EndReason::Evicted));
+    assert_eq!(store.end_of(many[699]), None);
+    assert!(store.bytes() <= 100_000);
 }

@@ -5,12 +5,13 @@
 
 use std::collections::VecDeque;
 
+use darn_budget::Budget;
 use nalgebra::{DMatrix, DVector};
 
 use super::chart::Layout;
 use super::error::FlattenError;
 use super::rest_triangle::RestTriangle;
-use crate::cholesky::{Factor, Symmetric};
+use crate::cholesky::{Factor, SolveError, Symmetric};
 use crate::mesh::{TriMesh, Vec2};
 
 /// Rounds end when one lowers the energy by less than this share.
@@ -23,6 +24,7 @@ pub(super) struct ArapEnergy<'a> {
     mesh: &'a TriMesh,
     springs: Vec<FaceSprings>,
     factor: Factor,
+    budget: &'a Budget<'a>,
 }
 
 /// A face at rest: its edges from corner k to k + 1 and the cotangents of the angles opposite them.
@@ -37,8 +39,12 @@ impl<'a> ArapEnergy<'a> {
     /// Factors the global step of a connected mesh.
     ///
     /// # Errors
-    /// `Singular` for degenerate triangles.
-    pub fn new(mesh: &'a TriMesh, rest: &[RestTriangle]) -> Result<Self, FlattenError> {
+    /// `Singular` for degenerate triangles; `Exhausted`.
+    pub fn new(
+        mesh: &'a TriMesh,
+        rest: &[RestTriangle],
+        budget: &'a Budget<'a>,
+    ) -> Result<Self, FlattenError> {
         let mut matrix = Symmetric::zero(mesh.positions.len());
         for (face, triangle) in mesh.faces.iter().zip(rest) {
             for k in 0..3 {
@@ -48,19 +54,20 @@ impl<'a> ArapEnergy<'a> {
         }
         // The energy does not see translations: hold the first vertex where it is.
         matrix.add(0, 0, 1.0);
-        let factor = matrix.factor().map_err(|_| singular(mesh))?;
+        let factor = matrix.factor(budget).map_err(|e| unsolved(e, mesh))?;
         let springs = rest.iter().map(FaceSprings::of).collect();
         Ok(ArapEnergy {
             mesh,
             springs,
             factor,
+            budget,
         })
     }
 
     /// Minimises from a layout, in at most `max_rounds` rounds; may flip faces.
     ///
     /// # Errors
-    /// `Singular` when a step is not finite.
+    /// `Singular` when a step is not finite; `Exhausted`.
     pub fn minimise(&self, start: Vec<Vec2>, max_rounds: usize) -> Result<Layout, FlattenError> {
         let mut history = AndersonHistory::default();
         let mut flat = start;
@@ -69,6 +76,7 @@ impl<'a> ArapEnergy<'a> {
         let (mut before, mut rounds) = (f64::INFINITY, 0);
         while rounds < max_rounds {
             rounds += 1;
+            self.budget.spend(self.round_work())?;
             let (mut energy, mut forces) = self.local(&flat);
             if (energy.is_nan() || energy >= before)
                 && let Some(back) = plain.take()
@@ -103,6 +111,11 @@ impl<'a> ArapEnergy<'a> {
         self.global(forces)
     }
 
+    /// Work of a round, nanoseconds.
+    fn round_work(&self) -> u64 {
+        FACE_WORK * self.springs.len() as u64 + self.factor.solve_work(2)
+    }
+
     /// The energy of a layout and the right-hand side for its best rotations.
     fn local(&self, flat: &[Vec2]) -> (f64, Vec<[f64; 2]>) {
         let mut energy = 0.0;
@@ -129,17 +142,17 @@ impl<'a> ArapEnergy<'a> {
     /// Solves for the layout that is in equilibrium with the forces.
     fn global(&self, mut forces: Vec<[f64; 2]>) -> Result<Vec<Vec2>, FlattenError> {
         let solved = self.factor.solve(&mut forces);
-        solved.map_err(|_| singular(self.mesh))?;
+        solved.map_err(|e| unsolved(e, self.mesh))?;
         Ok(forces.into_iter().map(Vec2::from).collect())
     }
 }
 
-fn singular(mesh: &TriMesh) -> FlattenError {
-    FlattenError::Singular {
-        stage: "ARAP",
-        vertices: mesh.positions.len(),
-    }
+fn unsolved(error: SolveError, mesh: &TriMesh) -> FlattenError {
+    FlattenError::unsolved(error, "ARAP", mesh.positions.len())
 }
+
+/// Nanoseconds of work a face in a round, without the solution of the global step.
+const FACE_WORK: u64 = 60;
 
 impl FaceSprings {
     fn of(triangle: &RestTriangle) -> FaceSprings {

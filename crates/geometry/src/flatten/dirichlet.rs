@@ -1,6 +1,7 @@
 //! A flip-free layout: the symmetric Dirichlet energy, minimised by reweighted ARAP steps (SLIM; Rabinovich, Poranne,
 //! Panozzo, Sorkine-Hornung 2017).
 
+use darn_budget::Budget;
 use nalgebra::Matrix2;
 
 use super::chart::Layout;
@@ -17,15 +18,18 @@ const GAIN: f64 = 1e-4;
 const SAFE: f64 = 0.8;
 /// Weight of the distance from the point before the step, per coordinate; keeps the system definite.
 const PROXIMAL: f64 = 1e-6;
+/// Nanoseconds of work a face in a step, without its factor.
+const FACE_WORK: u64 = 2000;
 
 /// Minimises Σ_f A_f (‖J‖² + ‖J⁻¹‖²) from a start without flips; never flips a face.
 ///
 /// # Errors
-/// `Singular` when a step's system has no solution.
+/// `Singular` when a step's system has no solution; `Exhausted`.
 pub(super) fn minimise(
     mesh: &TriMesh,
     rest: &[RestTriangle],
     start: &[Vec2],
+    budget: &Budget,
 ) -> Result<Layout, FlattenError> {
     let gradients: Vec<[Vec2; 3]> = rest.iter().map(RestTriangle::gradients).collect();
     let problem = DirichletEnergy {
@@ -38,7 +42,8 @@ pub(super) fn minimise(
     let mut steps = 0;
     while steps < STEPS {
         steps += 1;
-        let goal = problem.step(&flat)?;
+        budget.spend(FACE_WORK * rest.len() as u64)?;
+        let goal = problem.step(&flat, budget)?;
         let direction: Vec<Vec2> = goal.iter().zip(&flat).map(|(g, p)| g - p).collect();
         let mut length = (SAFE * problem.first_flip(&flat, &direction)).min(1.0);
         let before = energy;
@@ -96,9 +101,10 @@ impl DirichletEnergy<'_> {
     }
 
     /// The minimiser of the quadratic proxy Σ A ‖W (J − R)‖² around `flat`.
-    fn step(&self, flat: &[Vec2]) -> Result<Vec<Vec2>, FlattenError> {
+    fn step(&self, flat: &[Vec2], budget: &Budget) -> Result<Vec<Vec2>, FlattenError> {
+        const STAGE: &str = "symmetric Dirichlet";
         let singular = || FlattenError::Singular {
-            stage: "symmetric Dirichlet",
+            stage: STAGE,
             vertices: flat.len(),
         };
         let mut matrix = Symmetric::zero(2 * flat.len());
@@ -129,9 +135,9 @@ impl DirichletEnergy<'_> {
             }
         }
         matrix
-            .factor()
+            .factor(budget)
             .and_then(|factor| factor.solve(&mut rhs))
-            .map_err(|_| singular())?;
+            .map_err(|e| FlattenError::unsolved(e, STAGE, flat.len()))?;
         Ok((0..flat.len())
             .map(|v| Vec2::new(rhs[2 * v][0], rhs[2 * v + 1][0]))
             .collect())
@@ -212,7 +218,7 @@ mod tests {
             .iter()
             .map(|p| Vec2::new(3.0 * p.0, 0.2 * p.1 + 0.5 * p.0))
             .collect();
-        let flat = minimise(&mesh, &RestTriangle::of(&mesh), &start)
+        let flat = minimise(&mesh, &RestTriangle::of(&mesh), &start, Budget::unlimited())
             .unwrap()
             .flat;
         for (a, b) in [(0, 1), (1, 2), (2, 3), (3, 0)] {

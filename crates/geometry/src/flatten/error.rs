@@ -1,5 +1,9 @@
 //! Why a region has no chart.
 
+use darn_budget::Exhausted;
+
+use crate::cholesky::SolveError;
+
 /// Why a region could not be flattened.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum FlattenError {
@@ -33,4 +37,17 @@ pub enum FlattenError {
         /// Faces of the region.
         faces: usize,
     },
+    /// The request's budget is exhausted.
+    #[error(transparent)]
+    Exhausted(#[from] Exhausted),
+}
+
+impl FlattenError {
+    /// The error of a stage whose system has no solution; `vertices` are the region's.
+    pub(super) fn unsolved(error: SolveError, stage: &'static str, vertices: usize) -> Self {
+        match error {
+            SolveError::NotPositive => FlattenError::Singular { stage, vertices },
+            SolveError::Exhausted(exhausted) => FlattenError::Exhausted(exhausted),
+        }
+    }
 }

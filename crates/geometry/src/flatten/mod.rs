@@ -22,6 +22,8 @@ pub use uv_square::UvSquare;
 use arap::ArapEnergy;
 use chart::{Layout, flipped_faces, stretch};
 
+use darn_budget::Budget;
+
 use crate::mesh::Vec2;
 use crate::mesh::region::Region;
 
@@ -50,12 +52,13 @@ const EXTENT_ROUNDS: usize = 6;
 /// Nothing is pinned but the rigid motion. Holes are open: their shape in the plane follows from the cloth around them.
 ///
 /// # Errors
-/// `Singular` for degenerate triangles, `TooStretched` and `Flipped` when the surface is too far from developable.
+/// `Singular` for degenerate triangles, `TooStretched` and `Flipped` when the surface is too far from developable; `Exhausted`.
 ///
 /// ```
+/// use darn_budget::Budget;
 /// use darn_geometry::flatten::{FlattenLimits, flatten};
 /// use darn_geometry::mesh::loops::{LoopKind, boundary_loops};
-/// use darn_geometry::mesh::region::grow;
+/// use darn_geometry::mesh::region::{BoundedMesh, grow};
 /// use darn_geometry::mesh::shapes::holed_sheet;
 /// use darn_geometry::mesh::weld::weld;
 ///
@@ -64,22 +67,27 @@ const EXTENT_ROUNDS: usize = 6;
 /// let topology = welded.topology();
 /// let loops = boundary_loops(&welded.mesh, &topology);
 /// let hole = loops.iter().find(|l| l.kind == LoopKind::Hole).expect("the sheet has a hole");
-/// let region = grow(&welded.mesh, &topology, &loops, hole.id, 0.2)?;
-/// let chart = flatten(&region, &FlattenLimits::default())?;
+/// let cloth = BoundedMesh { mesh: &welded.mesh, topology: &topology, loops: &loops };
+/// let region = grow(&cloth, hole.id, 0.2, Budget::unlimited())?;
+/// let chart = flatten(&region, &FlattenLimits::default(), Budget::unlimited())?;
 /// assert!(chart.stretch_max - 1.0 < 1e-6);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn flatten(region: &Region, limits: &FlattenLimits) -> Result<Chart, FlattenError> {
+pub fn flatten(
+    region: &Region,
+    limits: &FlattenLimits,
+    budget: &Budget,
+) -> Result<Chart, FlattenError> {
     let mesh = &region.mesh;
     let rest = RestTriangle::of(mesh);
-    let energy = ArapEnergy::new(mesh, &rest)?;
+    let energy = ArapEnergy::new(mesh, &rest, budget)?;
     let start = energy.assemble(&transport::rotations(mesh, &rest))?;
     let mut layout = energy.minimise(start, ROUNDS)?;
     if flipped_faces(mesh, &layout.flat) > 0 {
-        let start = tutte::embed(region)?;
+        let start = tutte::embed(region, budget)?;
         layout = energy.minimise(start.clone(), ROUNDS)?;
         if flipped_faces(mesh, &layout.flat) > 0 {
-            layout = dirichlet::minimise(mesh, &rest, &start)?;
+            layout = dirichlet::minimise(mesh, &rest, &start, budget)?;
         }
     }
     let Layout { flat, rounds } = layout;
@@ -114,11 +122,11 @@ pub fn flatten(region: &Region, limits: &FlattenLimits) -> Result<Chart, Flatten
 /// A narrow region suffices, and costs a small part of a chart worth sampling.
 ///
 /// # Errors
-/// `Singular` for degenerate triangles.
-pub fn hole_extent(region: &Region) -> Result<f64, FlattenError> {
+/// `Singular` for degenerate triangles; `Exhausted`.
+pub fn hole_extent(region: &Region, budget: &Budget) -> Result<f64, FlattenError> {
     let mesh = &region.mesh;
     let rest = RestTriangle::of(mesh);
-    let energy = ArapEnergy::new(mesh, &rest)?;
+    let energy = ArapEnergy::new(mesh, &rest, budget)?;
     let start = energy.assemble(&transport::rotations(mesh, &rest))?;
     let flat = energy.minimise(start, EXTENT_ROUNDS)?.flat;
     let frame = UvSquare::tightest(&flat);
@@ -135,7 +143,7 @@ mod tests {
     use super::*;
     use crate::mesh::Vec3;
     use crate::mesh::loops::{LoopKind, boundary_loops};
-    use crate::mesh::region::grow;
+    use crate::mesh::region::{BoundedMesh, grow};
     use crate::mesh::shapes::{jitter, sheet};
     use crate::mesh::weld::weld;
 
@@ -147,7 +155,12 @@ mod tests {
         let loops = boundary_loops(&welded.mesh, &topology);
         let hole = loops.iter().find(|l| l.kind == LoopKind::Hole);
         let hole = hole.expect("a hole").id;
-        grow(&welded.mesh, &topology, &loops, hole, 0.25).expect("a region")
+        let cloth = BoundedMesh {
+            mesh: &welded.mesh,
+            topology: &topology,
+            loops: &loops,
+        };
+        grow(&cloth, hole, 0.25, Budget::unlimited()).expect("a region")
     }
 
     fn rolled(bend: f64) -> impl Fn(f64, f64) -> Vec3 {
@@ -173,7 +186,7 @@ mod tests {
         #[test]
         fn rolled_cloth_flattens_to_itself(n in 12usize..32, bend in 0.1..6.0f64) {
             let region = region(n, 0.0, 0, rolled(bend));
-            let chart = flatten(&region, &FlattenLimits::default()).expect("a chart");
+            let chart = flatten(&region, &FlattenLimits::default(), Budget::unlimited()).expect("a chart");
             prop_assert_eq!(chart.flipped, 0);
             // Chords of the roll are developable, too.
             prop_assert!(chart.stretch_max < 1.01, "{}", chart.stretch_max);
@@ -182,7 +195,7 @@ mod tests {
             let rim: Vec<Vec2> = (region.rim.iter()).map(|v| unrolled(region.mesh.positions[*v as usize])).collect();
             let sides: Vec<f64> = (0..90).map(|degrees| larger_side(&rim, f64::from(degrees).to_radians())).collect();
             let (least, most) = sides.iter().fold((f64::INFINITY, 0.0f64), |(a, b), s| (a.min(*s), b.max(*s)));
-            let extent = hole_extent(&region).expect("an extent");
+            let extent = hole_extent(&region, Budget::unlimited()).expect("an extent");
             prop_assert!((0.98 * least..1.02 * most).contains(&extent), "{extent} not in {least}..{most}");
         }
 
@@ -191,9 +204,9 @@ mod tests {
             let region = region(n, noise, seed, |u, v| Vec3::new(u, v, 0.08 * (7.0 * u).sin() * (5.0 * v).cos()));
             let mesh = &region.mesh;
             let rest = RestTriangle::of(mesh);
-            let energy = ArapEnergy::new(mesh, &rest).expect("a factor");
+            let energy = ArapEnergy::new(mesh, &rest, Budget::unlimited()).expect("a factor");
             let unfolded = energy.assemble(&transport::rotations(mesh, &rest)).expect("a layout");
-            let tutte = tutte::embed(&region).expect("a layout");
+            let tutte = tutte::embed(&region, Budget::unlimited()).expect("a layout");
             let [a, b] = [unfolded, tutte].map(|start| energy.minimise(start, ROUNDS).expect("a chart").flat);
             let (a, b) = (stretch(mesh, &a).mean - 1.0, stretch(mesh, &b).mean - 1.0);
             prop_assert!((a - b).abs() < 0.02 * b + 1e-6, "{a} {b}");

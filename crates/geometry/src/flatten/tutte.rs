@@ -3,6 +3,8 @@
 
 use std::f64::consts::TAU;
 
+use darn_budget::Budget;
+
 use super::error::FlattenError;
 use crate::cholesky::Symmetric;
 use crate::mesh::region::Region;
@@ -13,8 +15,8 @@ use crate::mesh::{TriMesh, Vec2};
 /// The circle's circumference is the length of the outer loop, so the layout has about the right size.
 ///
 /// # Errors
-/// `Singular` when the system has no solution.
-pub(super) fn embed(region: &Region) -> Result<Vec<Vec2>, FlattenError> {
+/// `Singular` when the system has no solution; `Exhausted`.
+pub(super) fn embed(region: &Region, budget: &Budget) -> Result<Vec<Vec2>, FlattenError> {
     let Region { mesh, outer, .. } = region;
     let loops: Vec<&Vec<u32>> = std::iter::once(&region.rim).chain(&region.holes).collect();
     let count = mesh.positions.len();
@@ -44,11 +46,10 @@ pub(super) fn embed(region: &Region) -> Result<Vec<Vec2>, FlattenError> {
     for (k, rim) in loops.iter().enumerate() {
         rim.iter().for_each(|v| join(count + k, *v as usize));
     }
-    let solved = matrix.factor().and_then(|factor| factor.solve(&mut rhs));
-    solved.map_err(|_| FlattenError::Singular {
-        stage: "Tutte",
-        vertices: count,
-    })?;
+    let solved = matrix
+        .factor(budget)
+        .and_then(|factor| factor.solve(&mut rhs));
+    solved.map_err(|e| FlattenError::unsolved(e, "Tutte", count))?;
     Ok((0..count)
         .map(|v| fixed[v].unwrap_or_else(|| rhs[unknown[v]].into()))
         .collect())

@@ -6,13 +6,14 @@
 //! along the surface. There noise folds triangles over, and a chart would need the area of each folded triangle
 //! twice.
 
+use darn_budget::{Budget, Exhausted};
 use nalgebra::{SMatrix, SVector};
 
 use super::curvature::doubled_normal;
 use super::index::HalfEdgeId;
 use super::topology::corners_by_vertex;
 use super::{TriMesh, Vec3};
-use crate::cholesky::Symmetric;
+use crate::cholesky::{SolveError, Symmetric};
 
 /// Noise level, in mean edges, below which a mesh counts as clean. Noise-free cloth reads 0.00 to 0.05; one sheet in
 /// twenty, all of it crumpled, reads 0.1.
@@ -32,6 +33,8 @@ const LOWER_QUARTER: f64 = 0.1580;
 /// A vertex with more faces is a hub. Scanners make no hubs, so its position tells nothing about noise; and its row
 /// of the bending energy has ½ k² entries for k neighbours, which would not fit into memory for half a million.
 const MOST_FACES: usize = 64;
+/// Nanoseconds of work a vertex, without the factor.
+const VERTEX_WORK: u64 = 500;
 /// Terms of a cubic in two variables.
 const TERMS: usize = 10;
 
@@ -40,14 +43,18 @@ const TERMS: usize = 10;
 /// Only positions change: x minimises Σ |xᵥ − scannedᵥ|² + λ Σ |mean of v's neighbours − xᵥ|², where border vertices
 /// have only their neighbours on the border, and hubs (more than 64 faces) have no second term. Works on any mesh;
 /// one sparse factor.
-pub fn denoise(mesh: &TriMesh) -> Option<TriMesh> {
+///
+/// # Errors
+/// `Exhausted`.
+pub fn denoise(mesh: &TriMesh, budget: &Budget) -> Result<Option<TriMesh>, Exhausted> {
+    budget.spend(VERTEX_WORK * mesh.positions.len() as u64)?;
     let incidence = Incidence::of(mesh);
     if noise_level(mesh, &incidence, SCREENING_SAMPLES) < 0.5 * CLEAN {
-        return None;
+        return Ok(None);
     }
     let level = noise_level(mesh, &incidence, SAMPLES);
     if !(level > CLEAN && level.is_finite()) {
-        return None;
+        return Ok(None);
     }
     let mut energy = Symmetric::zero(mesh.positions.len());
     for v in 0..mesh.positions.len() {
@@ -64,11 +71,17 @@ pub fn denoise(mesh: &TriMesh) -> Option<TriMesh> {
         }
     }
     let mut smooth: Vec<[f64; 3]> = mesh.positions.iter().map(|p| (*p).into()).collect();
-    energy.factor().ok()?.solve(&mut smooth).ok()?;
-    Some(TriMesh {
-        positions: smooth.into_iter().map(Vec3::from).collect(),
-        faces: mesh.faces.clone(),
-    })
+    match energy
+        .factor(budget)
+        .and_then(|factor| factor.solve(&mut smooth))
+    {
+        Ok(()) => Ok(Some(TriMesh {
+            positions: smooth.into_iter().map(Vec3::from).collect(),
+            faces: mesh.faces.clone(),
+        })),
+        Err(SolveError::NotPositive) => Ok(None),
+        Err(SolveError::Exhausted(exhausted)) => Err(exhausted),
+    }
 }
 
 /// The corners at every vertex, each as the half-edge that leaves it.
@@ -266,7 +279,7 @@ mod tests {
         fn clean_cloth_is_not_changed(n in 24usize..40, fold in 0.0..12.0f64) {
             let folded = sheet(n, |_, _| true, |u, v| Vec3::new(u, v, 0.05 * (fold * (u + v)).sin()));
             prop_assert!(level(&folded) < 0.03, "{}", level(&folded));
-            prop_assert_eq!(denoise(&folded), None);
+            prop_assert_eq!(denoise(&folded, Budget::unlimited()), Ok(None));
         }
 
         #[test]
@@ -279,7 +292,7 @@ mod tests {
             let true_level = noise / 3f64.sqrt() / 1.14;
             let measured = level(&noisy);
             prop_assert!((measured / true_level - 1.0).abs() < 0.4, "{measured} {true_level}");
-            let smooth = denoise(&noisy);
+            let smooth = denoise(&noisy, Budget::unlimited()).unwrap();
             prop_assert!(smooth.is_some());
             if let Some(smooth) = smooth {
                 prop_assert_eq!(&smooth.faces, &noisy.faces);
@@ -293,7 +306,9 @@ mod tests {
     fn a_hub_stays_and_collects_no_rings() {
         let noisy = jitter(&sheet(24, |_, _| true, waves), 0.3 / 24.0, 7);
         let lift = |spokes: u32| {
-            let smooth = denoise(&concat(&cone(spokes, 0.05), &noisy)).expect("noise");
+            let smooth = denoise(&concat(&cone(spokes, 0.05), &noisy), Budget::unlimited())
+                .unwrap()
+                .expect("noise");
             smooth.positions[0].z
         };
         assert!(lift(64) < 0.045, "{}", lift(64));
@@ -310,7 +325,7 @@ mod tests {
     #[test]
     fn meshes_without_inner_vertices_have_no_noise_level() {
         assert_eq!(level(&TriMesh::default()), 0.0);
-        assert_eq!(denoise(&TriMesh::default()), None);
+        assert_eq!(denoise(&TriMesh::default(), Budget::unlimited()), Ok(None));
         assert_eq!(level(&holed_sheet(1, 0.0)), 0.0);
     }
 }

@@ -3,6 +3,8 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
+use darn_budget::{Budget, Exhausted, Steps};
+
 use super::index::VertexId;
 use super::topology::Topology;
 use super::{TriMesh, Vec3};
@@ -13,12 +15,17 @@ use super::{TriMesh, Vec3};
 /// Fast marching on the triangles (Kimmel & Sethian 1998): Dijkstra along edges, improved by letting a straight front
 /// cross each face. Never longer than the shortest path along edges; within a few per cent of the true distance on
 /// scan-like triangles. O(n log n) in the vertices within `limit`. Sources that do not exist are ignored.
+///
+/// # Errors
+/// `Exhausted`.
 pub(super) fn geodesic_distance(
     mesh: &TriMesh,
     topology: &Topology,
     sources: &[VertexId],
     limit: f64,
-) -> Vec<f64> {
+    budget: &Budget,
+) -> Result<Vec<f64>, Exhausted> {
+    let mut steps = Steps::of(budget);
     let mut distance = vec![f64::INFINITY; mesh.positions.len()];
     let mut done = vec![false; mesh.positions.len()];
     let mut queue = BinaryHeap::new();
@@ -43,6 +50,7 @@ pub(super) fn geodesic_distance(
             continue;
         }
         let from = distance[vertex.index()];
+        steps.take(FAN_WORK * topology.leaving(vertex).len() as u64)?;
         for &h in topology.leaving(vertex) {
             let (a, b) = (topology.target(h), topology.origin(h.previous()));
             for (goal, other) in [(a, b), (b, a)] {
@@ -72,8 +80,11 @@ pub(super) fn geodesic_distance(
             *d = f64::INFINITY;
         }
     }
-    distance
+    Ok(distance)
 }
+
+/// Nanoseconds of work a half-edge.
+const FAN_WORK: u64 = 40;
 
 /// The time at which a straight front of speed 1 reaches the third corner of a face, when it passes the other two at
 /// `ta` and `tb`; `a` and `b` are their positions relative to the third. `None` when the front does not come through
@@ -139,7 +150,7 @@ mod tests {
             }
             let source = pick.index(mesh.positions.len());
             let topology = Topology::new(&mesh);
-            let distance = geodesic_distance(&mesh, &topology, &[VertexId(source as u32)], f64::INFINITY);
+            let distance = geodesic_distance(&mesh, &topology, &[VertexId(source as u32)], f64::INFINITY, Budget::unlimited()).unwrap();
             for (p, d) in mesh.positions.iter().zip(&distance) {
                 let straight = (p - mesh.positions[source]).norm();
                 prop_assert!(*d > straight - 1e-9 - 0.02 * straight && *d < 1.15 * straight + 0.5 / n as f64, "{d} {straight}");
@@ -150,7 +161,7 @@ mod tests {
         fn a_straight_front_stays_straight(n in 4usize..16) {
             let mesh = sheet(n, |_, _| true, |u, v| Vec3::new(u, v, 0.0));
             let sources: Vec<VertexId> = (0..=n as u32).map(VertexId).collect();
-            let distance = geodesic_distance(&mesh, &Topology::new(&mesh), &sources, f64::INFINITY);
+            let distance = geodesic_distance(&mesh, &Topology::new(&mesh), &sources, f64::INFINITY, Budget::unlimited()).unwrap();
             for (p, d) in mesh.positions.iter().zip(&distance) {
                 prop_assert!((p.y - d).abs() < 1e-9);
             }
@@ -160,8 +171,14 @@ mod tests {
     #[test]
     fn without_a_source_nothing_is_reached() {
         let mesh = sheet(2, |_, _| true, |u, v| Vec3::new(u, v, 0.0));
-        let distance =
-            geodesic_distance(&mesh, &Topology::new(&mesh), &[VertexId(77)], f64::INFINITY);
+        let distance = geodesic_distance(
+            &mesh,
+            &Topology::new(&mesh),
+            &[VertexId(77)],
+            f64::INFINITY,
+            Budget::unlimited(),
+        )
+        .unwrap();
         assert!(distance.iter().all(|d| d.is_infinite()));
     }
 
@@ -169,10 +186,19 @@ mod tests {
     fn a_limit_only_leaves_out_what_is_farther() {
         let mesh = sheet(12, |_, _| true, |u, v| Vec3::new(u, v, u * v));
         let topology = Topology::new(&mesh);
-        let all = geodesic_distance(&mesh, &topology, &[VertexId(3)], f64::INFINITY);
-        for (near, all) in geodesic_distance(&mesh, &topology, &[VertexId(3)], 0.4)
-            .iter()
-            .zip(all)
+        let all = geodesic_distance(
+            &mesh,
+            &topology,
+            &[VertexId(3)],
+            f64::INFINITY,
+            Budget::unlimited(),
+        )
+        .unwrap();
+        for (near, all) in
+            geodesic_distance(&mesh, &topology, &[VertexId(3)], 0.4, Budget::unlimited())
+                .unwrap()
+                .iter()
+                .zip(all)
         {
             assert_eq!(*near, if all <= 0.4 { all } else { f64::INFINITY });
         }

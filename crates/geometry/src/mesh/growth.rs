@@ -1,10 +1,11 @@
 //! Which faces belong to a region of a given reach: faces near the rim, without islands, with the pockets they enclose.
 
-use super::TriMesh;
+use darn_budget::{Budget, Exhausted};
+
 use super::geodesic::geodesic_distance;
 use super::index::{FaceId, HalfEdgeId, LoopId};
 use super::loops::{BoundaryLoop, LoopKind};
-use super::topology::Topology;
+use super::region::BoundedMesh;
 
 /// The smallest reach tried, in mean edge lengths of the rim's faces.
 const NARROWEST: f64 = 3.0;
@@ -12,17 +13,15 @@ const NARROWEST: f64 = 3.0;
 const POCKET: f64 = 1.5;
 /// Rounds of dropping, filling and trimming. Each round settles only what the one before changed.
 const ROUNDS: usize = 8;
+/// Nanoseconds of work a face of the whole mesh in one pass over it.
+const FACE_WORK: u64 = 15;
 /// "On no loop."
 const NO_LOOP: LoopId = LoopId(u32::MAX);
 
 /// What stays the same while the reach shrinks.
 pub(super) struct Growth<'a> {
     /// The whole mesh.
-    pub mesh: &'a TriMesh,
-    /// Its topology.
-    pub topology: &'a Topology,
-    /// Its loops.
-    pub loops: &'a [BoundaryLoop],
+    pub whole: BoundedMesh<'a>,
     /// The loop that the region surrounds.
     pub rim: &'a BoundaryLoop,
     /// Per vertex its distance from the rim, scene units; infinite beyond the deepest pocket.
@@ -37,13 +36,21 @@ pub(super) struct Growth<'a> {
 
 impl<'a> Growth<'a> {
     /// Measures the cloth around `rim` as far as regions of up to `reach` (scene units) need it.
+    ///
+    /// # Errors
+    /// `Exhausted`.
     pub fn new(
-        mesh: &'a TriMesh,
-        topology: &'a Topology,
-        loops: &'a [BoundaryLoop],
+        whole: BoundedMesh<'a>,
         rim: &'a BoundaryLoop,
         reach: f64,
-    ) -> Self {
+        budget: &Budget,
+    ) -> Result<Self, Exhausted> {
+        let BoundedMesh {
+            mesh,
+            topology,
+            loops,
+        } = whole;
+        budget.spend(FACE_WORK * mesh.faces.len() as u64)?;
         let mut loop_of = vec![NO_LOOP; 3 * mesh.faces.len()];
         for l in loops {
             for h in &l.half_edges {
@@ -62,26 +69,30 @@ impl<'a> Growth<'a> {
         }
         let narrowest = NARROWEST * length / f64::max(count, 1.0);
         let limit = POCKET * reach.max(narrowest);
-        let distance = geodesic_distance(mesh, topology, &rim.vertices, limit);
-        Self {
-            mesh,
-            topology,
-            loops,
+        let distance = geodesic_distance(mesh, topology, &rim.vertices, limit, budget)?;
+        Ok(Self {
+            whole,
             rim,
             distance,
             narrowest,
             loop_of,
             touching,
-        }
+        })
     }
 
     /// Per face of the whole mesh whether it belongs to the region of a reach.
-    pub fn inside(&self, reach: f64) -> Vec<bool> {
+    ///
+    /// # Errors
+    /// `Exhausted`.
+    pub fn inside(&self, reach: f64, budget: &Budget) -> Result<Vec<bool>, Exhausted> {
+        let round_work = FACE_WORK * self.whole.mesh.faces.len() as u64;
+        budget.spend(round_work)?;
         let mut inside: Vec<bool> = self
             .faces()
             .map(|f| self.touching[f.index()] || self.depth(f) <= reach)
             .collect();
         for _ in 0..ROUNDS {
+            budget.spend(round_work)?;
             self.drop_islands(&mut inside);
             self.fill_pockets(&mut inside, POCKET * reach);
             if !self.trim_bow_ties(&mut inside) {
@@ -89,21 +100,23 @@ impl<'a> Growth<'a> {
             }
         }
         self.drop_islands(&mut inside);
-        inside
+        Ok(inside)
     }
 
     /// The loop a half-edge of the whole mesh lies on, if any.
     pub fn loop_at(&self, half_edge: HalfEdgeId) -> Option<&'a BoundaryLoop> {
-        self.loops.get(self.loop_of[half_edge.index()].index())
+        self.whole
+            .loops
+            .get(self.loop_of[half_edge.index()].index())
     }
 
     fn faces(&self) -> impl Iterator<Item = FaceId> + use<> {
-        (0..self.mesh.faces.len() as u32).map(FaceId)
+        (0..self.whole.mesh.faces.len() as u32).map(FaceId)
     }
 
     /// Distance of the farthest corner of a face from the rim.
     fn depth(&self, face: FaceId) -> f64 {
-        self.mesh.faces[face.index()]
+        self.whole.mesh.faces[face.index()]
             .iter()
             .map(|&v| self.distance[v as usize])
             .fold(0.0, f64::max)
@@ -111,7 +124,7 @@ impl<'a> Growth<'a> {
 
     /// The faces across the edges of a face.
     fn beside(&self, face: FaceId) -> impl Iterator<Item = FaceId> {
-        let twins = face.half_edges().map(|h| self.topology.twin(h));
+        let twins = face.half_edges().map(|h| self.whole.topology.twin(h));
         twins.into_iter().flatten().map(HalfEdgeId::face)
     }
 
@@ -173,16 +186,16 @@ impl<'a> Growth<'a> {
     /// A fan with a face at the rim is kept before others, then the largest. Faces at the rim are never taken out.
     fn trim_bow_ties(&self, inside: &mut [bool]) -> bool {
         let across = |h: HalfEdgeId| {
-            let twin = self.topology.twin(h);
+            let twin = self.whole.topology.twin(h);
             twin.filter(|t| inside[t.face().index()])
         };
         let on_border = |h: HalfEdgeId| inside[h.face().index()] && across(h).is_none();
         // Every open fan has one half-edge of the region's boundary that leaves its vertex.
-        let mut leaving = vec![0u8; self.mesh.positions.len()];
+        let mut leaving = vec![0u8; self.whole.mesh.positions.len()];
         let mut ties = Vec::new();
         for h in self.faces().flat_map(FaceId::half_edges) {
             if on_border(h) {
-                let v = self.topology.origin(h);
+                let v = self.whole.topology.origin(h);
                 let count = &mut leaving[v.index()];
                 *count = count.saturating_add(1);
                 if *count == 2 {
@@ -194,7 +207,7 @@ impl<'a> Growth<'a> {
         let mut taken: Vec<FaceId> = Vec::new();
         for v in ties {
             let mut fans: Vec<Vec<FaceId>> = Vec::new();
-            for &h in self.topology.leaving(v) {
+            for &h in self.whole.topology.leaving(v) {
                 if on_border(h) {
                     let around = |e: &HalfEdgeId| across(e.previous());
                     let mut fan: Vec<FaceId> = std::iter::successors(Some(h), around)

@@ -1,6 +1,7 @@
 //! Where a surface cuts through itself: a tree of bounding boxes finds candidate pairs of faces, exact predicates
 //! decide.
 
+use darn_budget::{Budget, Exhausted, Steps};
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
 use super::bounds::{BoundedFace, Bounds, BoxTree};
@@ -27,6 +28,19 @@ pub fn self_intersections(mesh: &TriMesh) -> Vec<(u32, u32)> {
 ///
 /// Meant for a patch in a large scan: a face outside the bounding box of `faces` costs one comparison.
 pub fn intersections_with(mesh: &TriMesh, faces: &[u32]) -> Vec<(u32, u32)> {
+    // Without limits there is no error.
+    intersections_within(mesh, faces, Budget::unlimited()).unwrap_or_default()
+}
+
+/// [`intersections_with`] within a budget: in a tangle every face may cut every other.
+///
+/// # Errors
+/// `Exhausted`.
+pub fn intersections_within(
+    mesh: &TriMesh,
+    faces: &[u32],
+    budget: &Budget,
+) -> Result<Vec<(u32, u32)>, Exhausted> {
     let mut asked = vec![false; mesh.faces.len()];
     let known = faces.iter().filter(|&&f| (f as usize) < mesh.faces.len());
     known.for_each(|&f| asked[f as usize] = true);
@@ -37,24 +51,33 @@ pub fn intersections_with(mesh: &TriMesh, faces: &[u32]) -> Vec<(u32, u32)> {
     let own = (0..mesh.faces.len() as u32).filter(|&f| asked[f as usize]);
     let tree = BoxTree::new(own.filter_map(bounded).collect());
     let Some(bounds) = tree.bounds() else {
-        return Vec::new();
+        return Ok(Vec::new());
     };
+    let mut steps = Steps::of(budget);
     let mut pairs = Vec::new();
     for other in (0..mesh.faces.len() as u32).filter_map(bounded) {
         if other.bounds.meets(bounds) {
             let g = other.face;
+            let mut tested = 0;
             tree.meeting(&other.bounds, |f| {
+                tested += 1;
                 // Of two faces asked for, each finds the other; only one of the two counts.
                 let once = f < g || (f > g && !asked[g as usize]);
                 if once && cut(mesh, f, g) {
                     pairs.push((f.min(g), f.max(g)));
                 }
             });
+            steps.take(BOX_WORK + PAIR_WORK * tested)?;
         }
     }
     pairs.sort_unstable();
-    pairs
+    Ok(pairs)
 }
+
+/// Nanoseconds of work a face in the search for boxes that meet its own.
+const BOX_WORK: u64 = 100;
+/// Nanoseconds of work a pair of faces whose boxes meet.
+const PAIR_WORK: u64 = 100;
 
 /// Whether two faces cut each other; see [`self_intersections`] for what counts.
 fn cut(mesh: &TriMesh, f: u32, g: u32) -> bool {

@@ -33,10 +33,11 @@ pub fn layers_near(whole: &TriMesh, region: &Region, margin: f64) -> TriMesh {
 mod tests {
     use super::*;
     use crate::mesh::loops::{LoopKind, boundary_loops};
-    use crate::mesh::region::grow;
+    use crate::mesh::region;
     use crate::mesh::shapes::{concat, sheet};
     use crate::mesh::topology::Topology;
     use crate::mesh::weld::weld;
+    use darn_budget::Budget;
 
     #[test]
     fn a_second_layer_is_near_and_the_rest_of_the_sheet_is_far() {
@@ -47,7 +48,17 @@ mod tests {
         let topology = Topology::new(&mesh);
         let loops = boundary_loops(&mesh, &topology);
         let hole = loops.iter().find(|l| l.kind == LoopKind::Hole).unwrap();
-        let region = grow(&mesh, &topology, &loops, hole.id, 0.2).unwrap();
+        let region = region::grow(
+            &region::BoundedMesh {
+                mesh: &mesh,
+                topology: &topology,
+                loops: &loops,
+            },
+            hole.id,
+            0.2,
+            Budget::unlimited(),
+        )
+        .unwrap();
         assert!(region.faces.len() < holed.faces.len());
 
         let near = layers_near(&mesh, &region, 0.06);

@@ -1,5 +1,7 @@
 //! The cloth around a hole: a piece of the mesh that is a disk once its holes are closed.
 
+use darn_budget::{Budget, Exhausted};
+
 use super::TriMesh;
 use super::growth::Growth;
 use super::index::{FaceId, HalfEdgeId, LoopId, VertexId};
@@ -68,6 +70,20 @@ pub enum RegionError {
         /// The smallest reach tried, scene units.
         reach: f64,
     },
+    /// The request's budget is exhausted.
+    #[error(transparent)]
+    Exhausted(#[from] Exhausted),
+}
+
+/// A mesh with what is known of its borders.
+#[derive(Debug, Clone, Copy)]
+pub struct BoundedMesh<'a> {
+    /// The mesh.
+    pub mesh: &'a TriMesh,
+    /// Its topology.
+    pub topology: &'a Topology,
+    /// Its boundary loops.
+    pub loops: &'a [BoundaryLoop],
 }
 
 /// What the reach is multiplied by when the piece is no disk.
@@ -83,22 +99,22 @@ const LARGEST: f64 = 1e100;
 /// that the border cuts become part of `outer`.
 ///
 /// # Errors
-/// When the rim does not exist, a coordinate exceeds 10¹⁰⁰, or no reach gives a disk.
+/// When the rim does not exist, a coordinate exceeds 10¹⁰⁰, or no reach gives a disk; `Exhausted`.
 pub fn grow(
-    mesh: &TriMesh,
-    topology: &Topology,
-    loops: &[BoundaryLoop],
+    whole: &BoundedMesh,
     rim: LoopId,
     reach: f64,
+    budget: &Budget,
 ) -> Result<Region, RegionError> {
-    let Some(asked) = loops.get(rim.index()) else {
+    let mesh = whole.mesh;
+    let Some(asked) = whole.loops.get(rim.index()) else {
         return Err(RegionError::NoSuchLoop {
             rim,
-            loops: loops.len(),
+            loops: whole.loops.len(),
         });
     };
     small_enough(mesh, asked, &asked.vertices)?;
-    let growth = Growth::new(mesh, topology, loops, asked, reach);
+    let growth = Growth::new(*whole, asked, reach, budget)?;
     let narrowest = growth.narrowest;
     let farthest = growth
         .distance
@@ -109,7 +125,7 @@ pub fn grow(
     let mut reach = reach.min(farthest);
     loop {
         reach = reach.max(narrowest);
-        let shape = match cut_out(&growth, reach) {
+        let shape = match cut_out(&growth, reach, budget)? {
             Ok(region) => {
                 small_enough(mesh, asked, &region.vertices)?;
                 return Ok(region);
@@ -154,9 +170,22 @@ struct Shape {
 }
 
 /// The faces within a reach as a mesh of its own, if it is a disk once its holes are closed.
-fn cut_out(growth: &Growth, reach: f64) -> Result<Region, Shape> {
-    let Growth { mesh, topology, .. } = *growth;
-    let inside = growth.inside(reach);
+///
+/// # Errors
+/// `Exhausted`.
+fn cut_out(
+    growth: &Growth,
+    reach: f64,
+    budget: &Budget,
+) -> Result<Result<Region, Shape>, Exhausted> {
+    let inside = growth.inside(reach, budget)?;
+    budget.check()?;
+    Ok(cut_out_faces(growth, &inside, reach))
+}
+
+/// The faces `inside` as a mesh of its own, if it is a disk once its holes are closed.
+fn cut_out_faces(growth: &Growth, inside: &[bool], reach: f64) -> Result<Region, Shape> {
+    let BoundedMesh { mesh, topology, .. } = growth.whole;
     let faces: Vec<FaceId> = (0..inside.len() as u32)
         .map(FaceId)
         .filter(|f| inside[f.index()])
@@ -268,13 +297,16 @@ mod tests {
         }
 
         fn grow(&self, reach: f64) -> Result<Region, RegionError> {
-            grow(
-                &self.mesh,
-                &self.topology,
-                &self.loops,
-                self.hole().id,
-                reach,
-            )
+            self.grow_around(self.hole().id, reach)
+        }
+
+        fn grow_around(&self, rim: LoopId, reach: f64) -> Result<Region, RegionError> {
+            let whole = BoundedMesh {
+                mesh: &self.mesh,
+                topology: &self.topology,
+                loops: &self.loops,
+            };
+            grow(&whole, rim, reach, Budget::unlimited())
         }
     }
 
@@ -424,7 +456,7 @@ mod tests {
     #[test]
     fn a_loop_that_does_not_exist_is_named() {
         let whole = Whole::new(&holed_sheet(8, 0.2));
-        let missing = grow(&whole.mesh, &whole.topology, &whole.loops, LoopId(7), 1.0);
+        let missing = whole.grow_around(LoopId(7), 1.0);
         assert_eq!(
             missing,
             Err(RegionError::NoSuchLoop {

@@ -7,10 +7,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use darn_budget::{Budget, Exhausted};
 use nalgebra::{DMatrix, Matrix3};
 
 use super::harmonic::HarmonicExtension;
 use super::{Patch, PatchPlan};
+use crate::cholesky::SolveError;
 use crate::flatten::Chart;
 use crate::mesh::Vec2;
 use crate::mesh::region::Region;
@@ -25,6 +27,8 @@ pub struct Columns<'a> {
     pub values: &'a (dyn Fn(u32) -> Vec<f64> + Sync),
     /// Number of columns.
     pub width: usize,
+    /// What extending them may cost.
+    pub budget: &'a Budget<'a>,
 }
 
 /// A vertex of the patch with its attributes; a patch vertex on a texture seam has one on each side.
@@ -48,13 +52,16 @@ pub struct AttributedPatch {
 }
 
 /// Extends the scan's attributes into a patch; `plan` must be the plan that made it.
+///
+/// # Errors
+/// `Exhausted`: every texture island at the rim is extended over the whole patch.
 pub fn extend_attributes(
     plan: &PatchPlan,
     patch: &Patch,
     region: &Region,
     chart: &Chart,
     columns: &Columns,
-) -> AttributedPatch {
+) -> Result<AttributedPatch, Exhausted> {
     let corners = shared_corners(region, columns);
     let islands = islands(&corners, columns.width);
     let around = RimAttributes {
@@ -75,8 +82,8 @@ pub fn extend_attributes(
     let faces = face_labels(patch, &around, &labels);
     let extended: BTreeMap<u32, Vec<Vec<f64>>> = labels
         .iter()
-        .map(|l| (*l, extend_island(*l, patch, region, chart, &around)))
-        .collect();
+        .map(|l| Ok((*l, extend_island(*l, patch, region, chart, &around)?)))
+        .collect::<Result<_, Exhausted>>()?;
 
     let mut index = BTreeMap::new();
     let mut corners: Vec<Corner> = Vec::new();
@@ -103,8 +110,13 @@ pub fn extend_attributes(
         .zip(&faces)
         .map(|(f, label)| f.map(|v| corner(v, *label)))
         .collect();
-    AttributedPatch { corners, faces }
+    Ok(AttributedPatch { corners, faces })
 }
+
+/// Nanoseconds of work a face of the region and island.
+const FACE_WORK: u64 = 10;
+/// Nanoseconds of work a value of a patch vertex: its fit and its harmonic extension.
+const VALUE_WORK: u64 = 300;
 
 /// The attributes around a hole with their texture islands.
 struct RimAttributes<'a> {
@@ -292,8 +304,12 @@ fn extend_island(
     region: &Region,
     chart: &Chart,
     around: &RimAttributes,
-) -> Vec<Vec<f64>> {
+) -> Result<Vec<Vec<f64>>, Exhausted> {
     let (columns, rim) = (around.columns, &around.rim);
+    let budget = columns.budget;
+    budget.spend(FACE_WORK * region.mesh.faces.len() as u64)?;
+    budget.spend(VALUE_WORK * (columns.width * patch.flat.len()) as u64)?;
+    budget.hold((size_of::<Vec<f64>>() + 8 * columns.width) * patch.flat.len())?;
     let mut samples: Vec<(u32, Vec2)> = Vec::new();
     let faces = region.mesh.faces.iter().zip(&around.corners);
     for ((face, corners), island) in faces.zip(&around.islands) {
@@ -319,15 +335,19 @@ fn extend_island(
     let extension = if vertices.len() == rim.len() {
         Ok(around.rim_extension)
     } else {
-        from_part = HarmonicExtension::new(&patch.flat, &patch.faces, &vertices);
+        from_part = HarmonicExtension::new(&patch.flat, &patch.faces, &vertices, budget);
         from_part.as_ref()
     };
+    if let Err(SolveError::Exhausted(exhausted)) = extension {
+        return Err(*exhausted);
+    }
     if let Ok(extension) = extension {
         let own: Vec<Vec<f64>> = held
             .iter()
             .map(|(_, scan)| (columns.values)(*scan))
             .collect();
         for c in 0..columns.width {
+            budget.check()?;
             let residual: Vec<[f64; 1]> = own
                 .iter()
                 .zip(&vertices)
@@ -341,7 +361,7 @@ fn extend_island(
             }
         }
     }
-    values
+    Ok(values)
 }
 
 /// Least-squares affine map from the chart to the columns, [3, width]: rows constant, x, y. Samples near the hole have
@@ -410,8 +430,18 @@ mod tests {
         let topology = welded.topology();
         let loops = boundary_loops(&welded.mesh, &topology);
         let hole = loops.iter().find(|l| l.kind == LoopKind::Hole).unwrap();
-        let region = region::grow(&welded.mesh, &topology, &loops, hole.id, f64::INFINITY).unwrap();
-        let chart = flatten(&region, &FlattenLimits::default()).unwrap();
+        let region = region::grow(
+            &region::BoundedMesh {
+                mesh: &welded.mesh,
+                topology: &topology,
+                loops: &loops,
+            },
+            hole.id,
+            f64::INFINITY,
+            Budget::unlimited(),
+        )
+        .unwrap();
+        let chart = flatten(&region, &FlattenLimits::default(), Budget::unlimited()).unwrap();
         let (options, filled) = (
             PatchOptions::default(),
             vec![Vec3::zeros(); crate::grid::CELLS],
@@ -431,8 +461,9 @@ mod tests {
             any: &any,
             values: &values,
             width: texture[0].len(),
+            budget: Budget::unlimited(),
         };
-        extend_attributes(&plan, &patch, &region, &chart, &columns)
+        extend_attributes(&plan, &patch, &region, &chart, &columns).unwrap()
     }
 
     #[test]

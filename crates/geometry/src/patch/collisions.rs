@@ -4,6 +4,8 @@
 //! which side is which (Volino & Magnenat-Thalmann 2006, "Resolving surface collisions through intersection contour
 //! minimization"). Costs one sweep over the boxes when nothing cuts.
 
+use darn_budget::{Budget, Exhausted};
+
 use super::Patch;
 use super::intersections::intersections_from;
 use super::triangulate::Triangulation;
@@ -35,6 +37,13 @@ struct RestEdge {
 
 /// Most rounds of pushes.
 const ROUNDS: usize = 100;
+/// Most pairs that all rounds together push apart, for each face of the patch. Patches that came apart needed 0.05, tangles that lost some
+/// of their pairs 12.
+const PAIRS_PER_FACE: usize = 20;
+/// Nanoseconds of work a pair in a round.
+const PUSH_WORK: u64 = 500;
+/// Nanoseconds of work an edge in a round.
+const EDGE_WORK: u64 = 80;
 /// Longest push of one round, in mean edges.
 const PUSH: f64 = 0.35;
 /// Sweeps of length correction after each round of pushes.
@@ -107,7 +116,13 @@ impl CollisionMesh {
 
     /// Moves inner vertices of the patch until nothing cuts, or keeps the round with the fewest cuts. Adds the pairs
     /// that came apart to `patch.collisions` and leaves the rest in `patch.crossings`.
-    pub fn separate(&self, patch: &mut Patch) {
+    ///
+    /// The rounds also end when they have looked at too many pairs for the size of the patch: a tangle in which every
+    /// face cuts every other does not come apart.
+    ///
+    /// # Errors
+    /// `Exhausted`.
+    pub fn separate(&self, patch: &mut Patch, budget: &Budget) -> Result<(), Exhausted> {
         let (rim, base) = (patch.rim.len(), self.positions.len());
         let mut positions = self.positions.clone();
         positions.extend_from_slice(&patch.positions[rim..]);
@@ -115,18 +130,21 @@ impl CollisionMesh {
             positions,
             faces: self.faces.clone(),
         };
-        let mut pairs = intersections_from(&mesh, self.first_face);
+        let mut pairs = intersections_from(&mesh, self.first_face, budget)?;
         let found = pairs.len();
         let mut least = found;
+        let mut looked_at = 0;
         for _ in 0..ROUNDS {
-            if pairs.is_empty() {
+            looked_at += pairs.len();
+            if pairs.is_empty() || looked_at > PAIRS_PER_FACE * patch.faces.len() {
                 break;
             }
+            budget.spend(PUSH_WORK * pairs.len() as u64 + EDGE_WORK * self.edges.len() as u64)?;
             self.push(&mut mesh, &pairs);
             for _ in 0..SWEEPS {
                 self.restore_lengths(&mut mesh.positions);
             }
-            pairs = intersections_from(&mesh, self.first_face);
+            pairs = intersections_from(&mesh, self.first_face, budget)?;
             if pairs.len() < least {
                 least = pairs.len();
                 patch.positions[rim..].copy_from_slice(&mesh.positions[base..]);
@@ -134,6 +152,7 @@ impl CollisionMesh {
         }
         patch.collisions += found - least;
         patch.crossings = least;
+        Ok(())
     }
 
     /// One step along the gradients of the intersection curves' lengths.
@@ -307,16 +326,18 @@ mod tests {
             positions: around.positions.iter().chain(tile).copied().collect(),
             faces: around.faces.clone(),
         };
-        let before = intersections_from(&joined(&tile), first_face).len();
+        let before = intersections_from(&joined(&tile), first_face, Budget::unlimited())
+            .unwrap()
+            .len();
         assert!(before > 0);
-        around.separate(&mut patch);
+        around.separate(&mut patch, Budget::unlimited()).unwrap();
         assert_eq!((patch.collisions, patch.crossings), (before, 0));
         assert_eq!(
-            intersections_from(&joined(&patch.positions), first_face),
+            intersections_from(&joined(&patch.positions), first_face, Budget::unlimited()).unwrap(),
             []
         );
         let again = patch.positions.clone();
-        around.separate(&mut patch);
+        around.separate(&mut patch, Budget::unlimited()).unwrap();
         assert_eq!(patch.collisions, before, "counted once");
         assert_eq!(
             patch.positions, again,
@@ -348,9 +369,15 @@ mod tests {
             mean_edge: 1.0,
         };
         (patch.positions, patch.collisions) = (tile, 0);
-        alone.clone().separate(&mut patch);
+        alone
+            .clone()
+            .separate(&mut patch, Budget::unlimited())
+            .unwrap();
         assert_eq!(patch.collisions, 0, "it does not cut itself");
-        alone.with_layers(&layer).separate(&mut patch);
+        alone
+            .with_layers(&layer)
+            .separate(&mut patch, Budget::unlimited())
+            .unwrap();
         assert_eq!((patch.collisions, patch.crossings), (before, 0));
         assert_eq!(patch.positions, again);
     }

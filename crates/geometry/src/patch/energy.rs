@@ -3,12 +3,13 @@
 //! Terms (projective dynamics, Bouaziz et al. 2014): every triangle wants a deformation within the strain limit, every
 //! vertex its target curvature, and weak tethers lead to the positions that the grid gave.
 
+use darn_budget::Budget;
 use nalgebra::Matrix2;
 
 use super::bending::{BendingTerm, bending_terms};
 use super::deformation::StrainTriangle;
 use super::rest::RestMesh;
-use crate::cholesky::{Factor, NotPositive, Symmetric};
+use crate::cholesky::{Factor, SolveError, Symmetric};
 use crate::mesh::Vec3;
 
 /// Weights of the strain energy and when its minimisation ends. Lengths are in mean edges of the patch and the
@@ -43,6 +44,9 @@ impl Default for StrainOptions {
     }
 }
 
+/// Nanoseconds of work a triangle in a round, without the solution.
+const FACE_WORK: u64 = 100;
+
 /// The energy of a rest mesh, its matrix factored; independent of where the mesh lies.
 pub(super) struct StrainEnergy {
     triangles: Vec<StrainTriangle>,
@@ -76,8 +80,12 @@ impl StrainEnergy {
     /// Assembles and factors the energy of a rest mesh.
     ///
     /// # Errors
-    /// `NotPositive` when the triangles at rest are degenerate.
-    pub fn new(rest: &RestMesh, options: &StrainOptions) -> Result<StrainEnergy, NotPositive> {
+    /// `NotPositive` when the triangles at rest are degenerate; `Exhausted`.
+    pub fn new(
+        rest: &RestMesh,
+        options: &StrainOptions,
+        budget: &Budget,
+    ) -> Result<StrainEnergy, SolveError> {
         let triangles: Vec<StrainTriangle> = (rest.faces.iter())
             .map(|f| StrainTriangle::new(f, rest.points))
             .collect();
@@ -104,9 +112,20 @@ impl StrainEnergy {
             factor: None,
         };
         if rest.free > 0 {
-            energy.factor = Some(energy.matrix().factor()?);
+            energy.factor = Some(energy.matrix().factor(budget)?);
         }
         Ok(energy)
+    }
+
+    /// About the nanoseconds that a round of limiting strain takes.
+    pub fn round_work(&self) -> u64 {
+        let solve = self.factor.as_ref().map_or(0, |f| f.solve_work(3));
+        FACE_WORK * self.triangles.len() as u64 + solve
+    }
+
+    /// About the nanoseconds that one solution with a single right-hand side takes.
+    pub fn solve_work(&self) -> u64 {
+        self.factor.as_ref().map_or(0, |f| f.solve_work(1))
     }
 
     /// Whether the factor holds for these options; only two of them enter it.
@@ -266,7 +285,7 @@ impl StrainEnergy {
     ///
     /// # Errors
     /// `NotPositive` when the solution is not finite.
-    pub fn solve<const K: usize>(&self, rhs: &mut [[f64; K]]) -> Result<(), NotPositive> {
+    pub fn solve<const K: usize>(&self, rhs: &mut [[f64; K]]) -> Result<(), SolveError> {
         self.factor
             .as_ref()
             .map_or(Ok(()), |factor| factor.solve(rhs))

@@ -5,11 +5,12 @@
 //! energy's matrix. The Cholesky factor stays as it is, the rows enter by the Woodbury identity: with B the rows of the
 //! points, C the rows of the forces and Z = A⁻¹Cᵀ, the forces λ for the targets t solve (B Z + W⁻¹) λ = t − B A⁻¹r.
 
+use darn_budget::Budget;
 use nalgebra::{DMatrix, Dyn, LU};
 
 use super::energy::StrainEnergy;
 use super::pull::Firmness;
-use crate::cholesky::NotPositive;
+use crate::cholesky::SolveError;
 use crate::mesh::Vec3;
 
 /// One pull in terms of the energy's free vertices.
@@ -44,6 +45,12 @@ impl AnchorForce {
     }
 }
 
+/// About the nanoseconds that assembling and factoring a dense system of pulls takes.
+pub(super) fn gram_work(pulls: usize) -> u64 {
+    let pulls = pulls as u64;
+    10 * pulls.pow(2) + pulls.pow(3) / 3
+}
+
 /// All forces on one energy, ready to be added to its solutions.
 pub(super) struct AnchorForces<'a> {
     forces: Vec<&'a AnchorForce>,
@@ -61,22 +68,25 @@ impl<'a> AnchorForces<'a> {
     /// Prepares the forces that can act on the energy's free vertices; `None` when there are none.
     ///
     /// # Errors
-    /// `NotPositive` when the energy's matrix cannot be solved.
+    /// `NotPositive` when the energy's matrix cannot be solved; `Exhausted`.
     pub fn new(
         energy: &StrainEnergy,
         forces: &'a [AnchorForce],
-    ) -> Result<Option<AnchorForces<'a>>, NotPositive> {
+        budget: &Budget,
+    ) -> Result<Option<AnchorForces<'a>>, SolveError> {
         let forces: Vec<&AnchorForce> = forces.iter().filter(|force| force.acts()).collect();
         if forces.is_empty() {
             return Ok(None);
         }
         let mut response = Vec::with_capacity(forces.len());
         for force in &forces {
+            budget.spend(energy.solve_work())?;
             let mut column = vec![[0.0]; energy.free()];
             force.shares.iter().for_each(|(v, w)| column[*v][0] += w);
             energy.solve(&mut column)?;
             response.push(column.into_iter().flatten().collect::<Vec<f64>>());
         }
+        budget.spend_at_once(gram_work(forces.len()))?;
         let mut gram = DMatrix::from_fn(forces.len(), forces.len(), |i, j| {
             forces[i]
                 .corners
@@ -95,6 +105,12 @@ impl<'a> AnchorForces<'a> {
             response,
             relaxations: 0,
         }))
+    }
+
+    /// About the nanoseconds that [`AnchorForces::add_to`] takes.
+    pub fn work(&self) -> u64 {
+        let (count, free) = (self.forces.len(), self.response.first().map_or(0, Vec::len));
+        (count * (3 * free + 6 * count)) as u64
     }
 
     /// Lets the points go only `share` as far as before. Soft pulls are relaxed first: beside hard ones, the first

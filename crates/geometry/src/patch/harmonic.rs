@@ -1,7 +1,9 @@
 //! Harmonic extension over a triangulated patch: values are given at some vertices and have the least Dirichlet energy
 //! at all others.
 
-use crate::cholesky::{Factor, NotPositive, Symmetric};
+use darn_budget::Budget;
+
+use crate::cholesky::{Factor, SolveError, Symmetric};
 use crate::flatten::RestTriangle;
 use crate::mesh::Vec2;
 
@@ -32,12 +34,13 @@ impl HarmonicExtension {
     /// `flat`.
     ///
     /// # Errors
-    /// `NotPositive` when some vertex has no connection to a held one.
+    /// `NotPositive` when some vertex has no connection to a held one; `Exhausted`.
     pub fn new(
         flat: &[Vec2],
         faces: &[[u32; 3]],
         held: &[u32],
-    ) -> Result<HarmonicExtension, NotPositive> {
+        budget: &Budget,
+    ) -> Result<HarmonicExtension, SolveError> {
         let mut role = vec![Role::Free(0); flat.len()];
         held.iter()
             .enumerate()
@@ -66,7 +69,7 @@ impl HarmonicExtension {
             }
         }
         let factor = if free > 0 {
-            Some(matrix.factor()?)
+            Some(matrix.factor(budget)?)
         } else {
             None
         };
@@ -83,10 +86,15 @@ impl HarmonicExtension {
     ///
     /// # Errors
     /// `NotPositive` when the result is not finite.
-    pub fn solve<const K: usize>(&self, load: &mut [[f64; K]]) -> Result<(), NotPositive> {
+    pub fn solve<const K: usize>(&self, load: &mut [[f64; K]]) -> Result<(), SolveError> {
         self.factor
             .as_ref()
             .map_or(Ok(()), |factor| factor.solve(load))
+    }
+
+    /// About the nanoseconds that [`HarmonicExtension::solve`] takes for one column.
+    pub fn solve_work(&self) -> u64 {
+        self.factor.as_ref().map_or(0, |f| f.solve_work(1))
     }
 
     /// Bytes of memory held, about.
@@ -99,7 +107,7 @@ impl HarmonicExtension {
     ///
     /// # Errors
     /// `NotPositive` when the result is not finite.
-    pub fn extend<const K: usize>(&self, held: &[[f64; K]]) -> Result<Vec<[f64; K]>, NotPositive> {
+    pub fn extend<const K: usize>(&self, held: &[[f64; K]]) -> Result<Vec<[f64; K]>, SolveError> {
         let mut x = vec![[0.0; K]; self.free];
         for (a, b, weight) in &self.couplings {
             (0..K).for_each(|k| x[*a][k] += weight * held[*b][k]);
@@ -140,7 +148,7 @@ mod tests {
             .collect();
         let f = |p: &Vec2| [2.0 * p.x - p.y + 1.0];
         let values: Vec<[f64; 1]> = held.iter().map(|v| f(&flat[*v as usize])).collect();
-        let extended = HarmonicExtension::new(&flat, &faces, &held)
+        let extended = HarmonicExtension::new(&flat, &faces, &held, Budget::unlimited())
             .unwrap()
             .extend(&values)
             .unwrap();

@@ -2,17 +2,26 @@
 //! boxes, plane tests with an error margin reject most of them, the exact predicates of `mesh::intersect` judge the
 //! rest.
 
+use darn_budget::{Budget, Exhausted, Steps};
+
 use crate::mesh::bounds::Bounds;
-use crate::mesh::intersect::intersections_with;
+use crate::mesh::intersect::intersections_within;
 use crate::mesh::{TriMesh, Vec3};
 
 /// All pairs of faces `(f, g)`, `f < g`, that cut each other, with `g` not below `first`; ascending.
 ///
-/// The same result as [`intersections_with`] for the faces from `first` on, in less time.
-pub(super) fn intersections_from(mesh: &TriMesh, first: usize) -> Vec<(u32, u32)> {
-    let candidates = candidates(mesh, first);
+/// The same result as [`intersections_within`] for the faces from `first` on, in less time.
+///
+/// # Errors
+/// `Exhausted`.
+pub(super) fn intersections_from(
+    mesh: &TriMesh,
+    first: usize,
+    budget: &Budget,
+) -> Result<Vec<(u32, u32)>, Exhausted> {
+    let candidates = candidates(mesh, first, budget)?;
     if candidates.is_empty() {
-        return Vec::new();
+        return Ok(Vec::new());
     }
     // The exact test, on a mesh of the candidates alone.
     let mut faces: Vec<u32> = candidates.iter().flat_map(|(f, g)| [*f, *g]).collect();
@@ -25,34 +34,46 @@ pub(super) fn intersections_from(mesh: &TriMesh, first: usize) -> Vec<(u32, u32)
         .map(|(k, _)| k)
         .collect();
     // `faces` ascends, so the pairs do, too.
-    let found = intersections_with(&few, &asked).into_iter();
-    found
+    let found = intersections_within(&few, &asked, budget)?.into_iter();
+    Ok(found
         .map(|(f, g)| (faces[f as usize], faces[g as usize]))
-        .collect()
+        .collect())
 }
 
 /// Pairs that may cut: their boxes overlap and no plane test separates them. Two faces below `first` are never
 /// compared.
-fn candidates(mesh: &TriMesh, first: usize) -> Vec<(u32, u32)> {
+///
+/// # Errors
+/// `Exhausted`.
+fn candidates(mesh: &TriMesh, first: usize, budget: &Budget) -> Result<Vec<(u32, u32)>, Exhausted> {
+    budget.spend(BOX_WORK * mesh.faces.len() as u64)?;
     let boxed = |face: usize| FaceBox::new(mesh, face);
     let mut own: Vec<FaceBox> = (first..mesh.faces.len()).filter_map(boxed).collect();
     let Some(all) = own.iter().map(|b| b.bounds).reduce(Bounds::merged) else {
-        return Vec::new();
+        return Ok(Vec::new());
     };
     let near = |b: &FaceBox| b.bounds.meets(&all);
     let mut held: Vec<FaceBox> = (0..first).filter_map(boxed).filter(near).collect();
     let strips = Strips::new(&own, &held, &all);
     let (own, held) = (strips.cut(&mut own), strips.cut(&mut held));
     let mut pairs = Vec::new();
+    let mut steps = Steps::of(budget);
     for (strip, (own, held)) in own.iter().zip(&held).enumerate() {
-        strips.sweep(own, held, |a, b| {
+        strips.sweep(own, held, &mut steps, |a, b| {
             if strips.first_of_both(a, b) == strip && !surely_apart(mesh, a.face, b.face) {
                 pairs.push((a.face.min(b.face), a.face.max(b.face)));
             }
-        });
+        })?;
     }
-    pairs
+    Ok(pairs)
 }
+
+/// Nanoseconds of work a face when its box is made and sorted.
+const BOX_WORK: u64 = 50;
+/// Nanoseconds of work a pair of boxes in a sweep.
+const SWEEP_WORK: u64 = 3;
+/// Nanoseconds of work a pair of faces whose boxes meet.
+const PAIR_WORK: u64 = 40;
 
 /// A face with its box.
 struct FaceBox {
@@ -142,26 +163,37 @@ impl Strips {
     }
 
     /// Calls `found` once with every pair of boxes in a strip that meet, at least one of them the patch's own.
+    ///
+    /// # Errors
+    /// `Exhausted`.
     fn sweep(
         &self,
         own: &[&FaceBox],
         held: &[&FaceBox],
+        steps: &mut Steps,
         mut found: impl FnMut(&FaceBox, &FaceBox),
-    ) {
+    ) -> Result<(), Exhausted> {
         let low = |b: &FaceBox| b.bounds.low[self.along];
         let mut start_from = |a: &FaceBox, others: &[&FaceBox]| {
+            let (mut swept, mut met) = (0, 0);
             (others.iter())
                 .take_while(|b| low(b) <= a.bounds.high[self.along])
+                .inspect(|_| swept += 1)
                 .filter(|b| a.bounds.meets(&b.bounds))
-                .for_each(|b| found(a, b));
+                .for_each(|b| {
+                    met += 1;
+                    found(a, b);
+                });
+            steps.take(SWEEP_WORK * swept + PAIR_WORK * met)
         };
         for (k, a) in own.iter().enumerate() {
-            start_from(a, &own[k + 1..]);
-            start_from(a, &held[held.partition_point(|b| low(b) < low(a))..]);
+            start_from(a, &own[k + 1..])?;
+            start_from(a, &held[held.partition_point(|b| low(b) < low(a))..])?;
         }
         for a in held {
-            start_from(a, &own[own.partition_point(|b| low(b) <= low(a))..]);
+            start_from(a, &own[own.partition_point(|b| low(b) <= low(a))..])?;
         }
+        Ok(())
     }
 }
 
@@ -263,7 +295,7 @@ mod tests {
             let mut mesh = scattered(&places, grain);
             mesh.positions.iter_mut().for_each(|p| p.y *= flat);
             let first = (share * mesh.faces.len() as f64) as usize;
-            let mut found = candidates(&mesh, first);
+            let mut found = candidates(&mesh, first, Budget::unlimited()).unwrap();
             found.sort_unstable();
             prop_assert_eq!(found, candidates_of_all(&mesh, first), "each pair once");
         }
@@ -282,7 +314,7 @@ mod tests {
             };
             let first = (share * mesh.faces.len() as f64) as usize;
             let own: Vec<u32> = (first as u32..mesh.faces.len() as u32).collect();
-            prop_assert_eq!(intersections_from(&mesh, first), intersections_with(&mesh, &own));
+            prop_assert_eq!(intersections_from(&mesh, first, Budget::unlimited()), intersections_within(&mesh, &own, Budget::unlimited()));
         }
     }
 
@@ -300,9 +332,12 @@ mod tests {
         for (held, patch) in [(&wall, &floor), (&floor, &wall)] {
             let (both, first) = (concat(held, patch), held.faces.len());
             let own: Vec<u32> = (first as u32..both.faces.len() as u32).collect();
-            let found = intersections_from(&both, first);
+            let found = intersections_from(&both, first, Budget::unlimited()).unwrap();
             assert!(found.len() >= 2 * n - 2, "{}", found.len());
-            assert_eq!(found, intersections_with(&both, &own));
+            assert_eq!(
+                Ok(found),
+                intersections_within(&both, &own, Budget::unlimited())
+            );
         }
     }
 }

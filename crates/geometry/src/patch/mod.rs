@@ -32,6 +32,9 @@ pub use plan::{PatchPlan, plan, plan_in, stretch_limit};
 pub use pull::{Firmness, Pull};
 pub use triangulate::signed_area;
 
+use darn_budget::{Budget, Exhausted};
+
+use crate::cholesky::SolveError;
 use crate::flatten::Chart;
 use crate::mesh::region::Region;
 use crate::mesh::{Vec2, Vec3};
@@ -48,6 +51,19 @@ pub enum PatchError {
         /// The stage that the system belongs to.
         stage: &'static str,
     },
+    /// The request's budget is exhausted.
+    #[error(transparent)]
+    Exhausted(#[from] Exhausted),
+}
+
+impl PatchError {
+    /// Makes the errors of a stage's system errors of the patch.
+    fn of_stage(stage: &'static str) -> impl Fn(SolveError) -> PatchError {
+        move |error| match error {
+            SolveError::NotPositive => PatchError::Singular { stage },
+            SolveError::Exhausted(exhausted) => PatchError::Exhausted(exhausted),
+        }
+    }
 }
 
 /// How a patch is made.
@@ -57,6 +73,25 @@ pub struct PatchOptions {
     pub max_vertices: usize,
     /// How strain is limited.
     pub strain: StrainOptions,
+}
+
+/// How a patch is made, and what that may cost.
+#[derive(Debug, Clone, Copy)]
+pub struct PatchWork<'a> {
+    /// How.
+    pub options: &'a PatchOptions,
+    /// What it may cost.
+    pub budget: &'a Budget<'a>,
+}
+
+impl<'a> From<&'a PatchOptions> for PatchWork<'a> {
+    /// Without limits.
+    fn from(options: &'a PatchOptions) -> PatchWork<'a> {
+        PatchWork {
+            options,
+            budget: Budget::unlimited(),
+        }
+    }
 }
 
 impl Default for PatchOptions {
@@ -127,12 +162,13 @@ fn locate(flat: &[Vec2], faces: &[[u32; 3]], p: Vec2) -> Option<(usize, [f64; 3]
 /// [`PatchPlan::patch`] in one call, without pulls.
 ///
 /// # Errors
-/// `RimCrosses` when the rim overlaps itself in the plane, `Singular` when triangles are degenerate.
-pub fn build(
+/// `RimCrosses` when the rim overlaps itself in the plane, `Singular` when triangles are degenerate; `Exhausted`.
+pub fn build<'a>(
     region: &Region,
     chart: &Chart,
     filled: &[Vec3],
-    options: &PatchOptions,
+    work: impl Into<PatchWork<'a>>,
 ) -> Result<Patch, PatchError> {
-    plan(region, chart, options)?.patch(chart, filled, &[], options)
+    let work = work.into();
+    plan(region, chart, work)?.patch(chart, filled, &[], work)
 }

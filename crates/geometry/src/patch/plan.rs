@@ -6,16 +6,18 @@ mod pieces;
 
 pub use anchors::stretch_limit;
 
-use pieces::{RimPoints, triangulate_pieces};
+use pieces::{Asked, RimPoints, triangulate_pieces};
+
+use darn_budget::{Budget, Exhausted};
 
 use super::collisions::CollisionMesh;
 use super::energy::StrainEnergy;
 use super::harmonic::HarmonicExtension;
 use super::pull::Pull;
 use super::rim_join::RimJoin;
-use super::strain::minimise;
+use super::strain::Minimisation;
 use super::triangulate::Triangulation;
-use super::{Patch, PatchError, PatchOptions};
+use super::{Patch, PatchError, PatchWork};
 use crate::flatten::Chart;
 use crate::grid;
 use crate::mesh::region::Region;
@@ -40,34 +42,34 @@ pub struct PatchPlan {
 /// Plans the patch of a region's hole when the region is all that is known of the scan.
 ///
 /// # Errors
-/// `RimCrosses` when the rim overlaps itself in the plane, `Singular` when triangles are degenerate.
-pub fn plan(
+/// `RimCrosses` when the rim overlaps itself in the plane, `Singular` when triangles are degenerate; `Exhausted`.
+pub fn plan<'a>(
     region: &Region,
     chart: &Chart,
-    options: &PatchOptions,
+    work: impl Into<PatchWork<'a>>,
 ) -> Result<PatchPlan, PatchError> {
     let rim = reversed_rim(region);
     let rim_points = RimPoints::new(&positions_of(&rim, &region.mesh), &region.mesh);
-    plan_rim(rim, rim_points, region, chart, options)
+    plan_rim(rim, rim_points, region, chart, work.into())
 }
 
 /// Plans the patch of a region's hole in the whole scan. The region's positions may differ from the scan's (when it was
 /// denoised), and parts of the scan beyond the region may touch the rim.
 ///
 /// # Errors
-/// `RimCrosses` when the rim overlaps itself in the plane, `Singular` when triangles are degenerate.
-pub fn plan_in(
+/// `RimCrosses` when the rim overlaps itself in the plane, `Singular` when triangles are degenerate; `Exhausted`.
+pub fn plan_in<'a>(
     scan: &TriMesh,
     region: &Region,
     chart: &Chart,
-    options: &PatchOptions,
+    work: impl Into<PatchWork<'a>>,
 ) -> Result<PatchPlan, PatchError> {
     let rim = reversed_rim(region);
     let scanned: Vec<u32> = (rim.iter())
         .map(|v| region.vertices[*v as usize].0)
         .collect();
     let rim_points = RimPoints::new(&positions_of(&scanned, scan), scan);
-    plan_rim(rim, rim_points, region, chart, options)
+    plan_rim(rim, rim_points, region, chart, work.into())
 }
 
 /// The rim of a region has the scan on its left and the hole on its right; reversed it runs counter-clockwise around
@@ -86,19 +88,26 @@ fn plan_rim(
     rim_points: RimPoints,
     region: &Region,
     chart: &Chart,
-    options: &PatchOptions,
+    work: PatchWork,
 ) -> Result<PatchPlan, PatchError> {
+    let PatchWork { options, budget } = work;
     let flat: Vec<Vec2> = rim.iter().map(|v| chart.flat[*v as usize]).collect();
     let spacing = spacing(region, chart);
-    let triangulation = triangulate_pieces(flat, rim_points, spacing, options.max_vertices)?;
+    let asked = Asked {
+        spacing,
+        max_points: options.max_vertices,
+        budget,
+    };
+    let triangulation = triangulate_pieces(flat, rim_points, &asked)?;
 
     let rim_positions = positions_of(&rim, &region.mesh);
     let held: Vec<u32> = (0..rim.len() as u32).collect();
-    let rim_extension = HarmonicExtension::new(&triangulation.points, &triangulation.faces, &held)
-        .map_err(|_| singular("seam"))?;
+    let rim_extension =
+        HarmonicExtension::new(&triangulation.points, &triangulation.faces, &held, budget)
+            .map_err(PatchError::of_stage("seam"))?;
     let join = RimJoin::new(&rim, &triangulation, region, chart);
-    let energy =
-        StrainEnergy::new(&join.rest(), &options.strain).map_err(|_| singular("strain"))?;
+    let energy = StrainEnergy::new(&join.rest(), &options.strain, budget)
+        .map_err(PatchError::of_stage("strain"))?;
     let collisions = CollisionMesh::new(&rim, &triangulation, region);
     Ok(PatchPlan {
         rim,
@@ -123,7 +132,7 @@ impl PatchPlan {
         let gaps: Vec<[f64; 3]> = (self.rim.iter().zip(&self.rim_positions))
             .map(|(v, own)| (positions[*v as usize] - own).into())
             .collect();
-        let extended = (self.rim_extension.extend(&gaps)).map_err(|_| singular("seam"))?;
+        let extended = (self.rim_extension.extend(&gaps)).map_err(PatchError::of_stage("seam"))?;
         self.shift = Some(extended.into_iter().map(Vec3::from).collect());
         self.collisions = self.collisions.with_region_at(positions);
         Ok(self)
@@ -137,8 +146,17 @@ impl PatchPlan {
 
     /// Separates a finished patch from a mesh that the plan does not contain; the patch stays clear of what the plan
     /// contains.
-    pub fn separate(&self, patch: &mut Patch, others: &TriMesh) {
-        self.collisions.clone().with_layers(others).separate(patch);
+    ///
+    /// # Errors
+    /// `Exhausted`.
+    pub fn separate(
+        &self,
+        patch: &mut Patch,
+        others: &TriMesh,
+        budget: &Budget,
+    ) -> Result<(), Exhausted> {
+        let all = self.collisions.clone().with_layers(others);
+        all.separate(patch, budget)
     }
 
     /// The harmonic extension from the rim to all vertices.
@@ -171,50 +189,58 @@ impl PatchPlan {
     /// tether than the plan's cost a new factor. A pull beside the hole, or next to its rim, does nothing.
     ///
     /// # Errors
-    /// `Singular` when triangles are degenerate.
-    pub fn patch(
+    /// `Singular` when triangles are degenerate; `Exhausted`.
+    pub fn patch<'a>(
         &self,
         chart: &Chart,
         filled: &[Vec3],
         pulls: &[Pull],
-        options: &PatchOptions,
+        work: impl Into<PatchWork<'a>>,
     ) -> Result<Patch, PatchError> {
+        let PatchWork { options, budget } = work.into();
         let strain = &options.strain;
         let refactored;
         let energy = if self.energy.fits(strain) {
             &self.energy
         } else {
-            refactored =
-                StrainEnergy::new(&self.join.rest(), strain).map_err(|_| singular("strain"))?;
+            refactored = StrainEnergy::new(&self.join.rest(), strain, budget)
+                .map_err(PatchError::of_stage("strain"))?;
             &refactored
         };
         let mut positions = self.join.with_inner(self.initial(chart, filled)?);
         let target = energy.target_near(&positions, strain);
-        let rounds = minimise(energy, &target, &mut positions, None, strain);
+        let minimisation = Minimisation {
+            energy,
+            target: &target,
+            forces: None,
+            options: *strain,
+            budget,
+        };
+        let rounds = minimisation.run(&mut positions);
         let mut patch = Patch {
             rim: self.rim.clone(),
             flat: self.triangulation.points.clone(),
             positions: self.with_rim(&positions),
             faces: self.triangulation.faces.clone(),
-            strain_rounds: rounds.map_err(|_| singular("strain"))?,
+            strain_rounds: rounds.map_err(PatchError::of_stage("strain"))?,
             collisions: 0,
             crossings: 0,
         };
         self.shift(&mut patch.positions, 1.0);
-        self.collisions.separate(&mut patch);
+        self.collisions.separate(&mut patch, budget)?;
         if pulls.is_empty() {
             return Ok(patch);
         }
         let mut unshifted = patch.positions.clone();
         self.shift(&mut unshifted, -1.0);
         let mut positions = self.join.with_inner(unshifted.split_off(self.rim.len()));
-        let forces = self.forces(pulls, chart, &positions);
+        let forces = self.forces(pulls, chart, &positions, budget)?;
         if !forces.is_empty() {
-            let rounds = self.apply_forces(energy, &mut positions, &forces, strain);
-            patch.strain_rounds += rounds.map_err(|_| singular("strain"))?;
+            let rounds = self.apply_forces(&minimisation, &mut positions, &forces);
+            patch.strain_rounds += rounds.map_err(PatchError::of_stage("strain"))?;
             patch.positions = self.with_rim(&positions);
             self.shift(&mut patch.positions, 1.0);
-            self.collisions.separate(&mut patch);
+            self.collisions.separate(&mut patch, budget)?;
         }
         Ok(patch)
     }
@@ -242,14 +268,10 @@ impl PatchPlan {
         let gaps: Vec<[f64; 3]> = (self.rim_positions.iter().zip(&sampled))
             .map(|(own, sampled)| (own - sampled).into())
             .collect();
-        let extended = (self.rim_extension.extend(&gaps)).map_err(|_| singular("seam"))?;
+        let extended = (self.rim_extension.extend(&gaps)).map_err(PatchError::of_stage("seam"))?;
         let closed = (sampled.iter().zip(&extended)).map(|(p, d)| p + Vec3::from(*d));
         Ok(closed.skip(self.rim.len()).collect())
     }
-}
-
-fn singular(stage: &'static str) -> PatchError {
-    PatchError::Singular { stage }
 }
 
 /// Edge length of a patch in the plane, scene units: a grid cell's side, so that the patch follows all folds of the

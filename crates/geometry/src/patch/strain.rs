@@ -5,44 +5,65 @@
 //! with one sparse factor. The local step takes every triangle to its nearest deformation within the strain limit, the
 //! global step solves for positions.
 
+use darn_budget::Budget;
+
 use super::anderson::AndersonMixing;
 use super::energy::{StrainEnergy, StrainOptions, StrainTarget};
 use super::forces::AnchorForces;
-use crate::cholesky::NotPositive;
+use crate::cholesky::SolveError;
 use crate::mesh::Vec3;
 
-/// Moves the free vertices, the first of `positions`, towards the least energy for a target and forces; returns the
-/// rounds it took.
-///
-/// # Errors
-/// `NotPositive` when a step is not finite.
-pub(super) fn minimise(
-    energy: &StrainEnergy,
-    target: &StrainTarget,
-    positions: &mut [Vec3],
-    forces: Option<&AnchorForces>,
-    options: &StrainOptions,
-) -> Result<usize, NotPositive> {
-    if energy.free() == 0 {
-        return Ok(0);
-    }
-    let mut mixing = AndersonMixing::new(3 * energy.free());
-    let mut step = target.constant().to_vec();
-    let mut rounds = 0;
-    while rounds < options.max_rounds {
-        step.copy_from_slice(target.constant());
-        energy.add_strain(&mut step, positions, target, options.max_strain);
-        energy.solve(&mut step)?;
-        if let Some(forces) = forces {
-            forces.add_to(&mut step);
+/// An energy to minimise, and how far.
+#[derive(Clone, Copy)]
+pub(super) struct Minimisation<'a> {
+    /// The energy.
+    pub energy: &'a StrainEnergy,
+    /// What its terms aim at.
+    pub target: &'a StrainTarget,
+    /// Forces beside it.
+    pub forces: Option<&'a AnchorForces<'a>>,
+    /// When the rounds end.
+    pub options: StrainOptions,
+    /// What the rounds may cost.
+    pub budget: &'a Budget<'a>,
+}
+
+impl Minimisation<'_> {
+    /// Moves the free vertices, the first of `positions`, towards the least energy; returns the rounds it took.
+    ///
+    /// # Errors
+    /// `NotPositive` when a step is not finite; `Exhausted`.
+    pub fn run(&self, positions: &mut [Vec3]) -> Result<usize, SolveError> {
+        let Minimisation {
+            energy,
+            target,
+            forces,
+            options,
+            budget,
+        } = *self;
+        if energy.free() == 0 {
+            return Ok(0);
         }
-        rounds += 1;
-        let moved = mixing.advance(positions, &step) / energy.mean_edge();
-        if moved < options.tolerance {
-            break;
+        let round_work = energy.round_work() + forces.map_or(0, AnchorForces::work);
+        let mut mixing = AndersonMixing::new(3 * energy.free());
+        let mut step = target.constant().to_vec();
+        let mut rounds = 0;
+        while rounds < options.max_rounds {
+            step.copy_from_slice(target.constant());
+            energy.add_strain(&mut step, positions, target, options.max_strain);
+            energy.solve(&mut step)?;
+            if let Some(forces) = forces {
+                forces.add_to(&mut step);
+            }
+            rounds += 1;
+            budget.spend(round_work)?;
+            let moved = mixing.advance(positions, &step) / energy.mean_edge();
+            if moved < options.tolerance {
+                break;
+            }
         }
+        Ok(rounds)
     }
-    Ok(rounds)
 }
 
 #[cfg(test)]
@@ -92,9 +113,17 @@ mod tests {
             faces: &faces,
             free,
         };
-        let energy = StrainEnergy::new(&rest_mesh, &options).unwrap();
+        let energy = StrainEnergy::new(&rest_mesh, &options, Budget::unlimited()).unwrap();
         let target = energy.target_near(&positions, &options);
-        minimise(&energy, &target, &mut positions, None, &options).unwrap();
+        Minimisation {
+            energy: &energy,
+            target: &target,
+            forces: None,
+            options,
+            budget: Budget::unlimited(),
+        }
+        .run(&mut positions)
+        .unwrap();
         for face in &faces {
             for k in 0..3 {
                 let (a, b) = (face[k] as usize, face[(k + 1) % 3] as usize);
@@ -115,9 +144,17 @@ mod tests {
             free,
         };
         let options = StrainOptions::default();
-        let energy = StrainEnergy::new(&rest_mesh, &options).unwrap();
+        let energy = StrainEnergy::new(&rest_mesh, &options, Budget::unlimited()).unwrap();
         let target = energy.target_near(&positions, &options);
-        minimise(&energy, &target, &mut positions, None, &options).unwrap();
+        Minimisation {
+            energy: &energy,
+            target: &target,
+            forces: None,
+            options,
+            budget: Budget::unlimited(),
+        }
+        .run(&mut positions)
+        .unwrap();
         for (p, q) in positions.iter().zip(&before) {
             assert!((p - q).norm() < 1e-9);
         }

@@ -19,8 +19,18 @@ fn wavy(slack: f64) -> (Region, Chart, Vec<Vec3>) {
     let topology = Topology::new(&mesh);
     let loops = boundary_loops(&mesh, &topology);
     let hole = loops.iter().find(|l| l.kind == LoopKind::Hole).unwrap();
-    let region = region::grow(&mesh, &topology, &loops, hole.id, f64::INFINITY).unwrap();
-    let mut chart = flatten(&region, &FlattenLimits::default()).unwrap();
+    let region = region::grow(
+        &region::BoundedMesh {
+            mesh: &mesh,
+            topology: &topology,
+            loops: &loops,
+        },
+        hole.id,
+        f64::INFINITY,
+        Budget::unlimited(),
+    )
+    .unwrap();
+    let mut chart = flatten(&region, &FlattenLimits::default(), Budget::unlimited()).unwrap();
     chart.flat.iter_mut().for_each(|p| *p *= slack);
     chart.frame = UvSquare::tightest(&chart.flat);
     (region, chart, vec![Vec3::zeros(); crate::grid::CELLS])
@@ -222,11 +232,21 @@ fn a_rim_that_touches_itself_is_closed_on_the_scan() {
     let topology = Topology::new(&scan);
     let loops = boundary_loops(&scan, &topology);
     let hole = loops.iter().find(|l| l.kind == LoopKind::Hole).unwrap();
-    let region = region::grow(&scan, &topology, &loops, hole.id, f64::INFINITY).unwrap();
+    let region = region::grow(
+        &region::BoundedMesh {
+            mesh: &scan,
+            topology: &topology,
+            loops: &loops,
+        },
+        hole.id,
+        f64::INFINITY,
+        Budget::unlimited(),
+    )
+    .unwrap();
     let mut seen = region.clone();
     let apart = (seen.mesh.positions.iter_mut()).enumerate();
     apart.for_each(|(v, p)| p.z += 1e-3 * (v as f64).sin());
-    let chart = flatten(&seen, &FlattenLimits::default()).unwrap();
+    let chart = flatten(&seen, &FlattenLimits::default(), Budget::unlimited()).unwrap();
     let options = PatchOptions::default();
     let plan = plan_in(&scan, &seen, &chart, &options).unwrap();
     let plan = plan.with_region_at(&region.mesh.positions).unwrap();

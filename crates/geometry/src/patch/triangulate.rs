@@ -1,6 +1,7 @@
 //! Triangles for a polygon in the plane: points of a triangular lattice inside, then a constrained Delaunay
 //! triangulation (crate spade) with the polygon's edges.
 
+use darn_budget::{Budget, Exhausted};
 use rstar::RTree;
 use rstar::primitives::Line;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation as _};
@@ -14,6 +15,9 @@ const CLEARANCE: f64 = 0.62;
 /// Most lattice spacings across a polygon: a thin area inside a wide ragged polygon must not make millions of empty
 /// rows.
 const FINEST: f64 = 4000.0;
+
+/// Nanoseconds of work a face in a split.
+const FACE_WORK: u64 = 50;
 
 /// A triangulated polygon.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,7 +59,15 @@ impl Triangulation {
     ///
     /// Two corners of a rim can be joined by an edge of the scan already. A second edge between them, of the patch,
     /// would be the same edge with four triangles.
-    pub fn split_chords(&mut self, corners: usize, taken: impl Fn(u32, u32) -> bool) {
+    ///
+    /// # Errors
+    /// `Exhausted`: every split looks at all faces.
+    pub fn split_chords(
+        &mut self,
+        corners: usize,
+        budget: &Budget,
+        taken: impl Fn(u32, u32) -> bool,
+    ) -> Result<(), Exhausted> {
         let apart = |a: u32, b: u32| {
             (a as usize + 1) % corners != b as usize && (b as usize + 1) % corners != a as usize
         };
@@ -66,6 +78,7 @@ impl Triangulation {
                 .find(|(a, b)| (*a.max(b) as usize) < corners && apart(*a, *b) && taken(*a, *b))
         };
         while let Some((a, b)) = chord(&self.faces) {
+            budget.spend(FACE_WORK * self.faces.len() as u64)?;
             let middle = self.points.len() as u32;
             self.points
                 .push((self.points[a as usize] + self.points[b as usize]) * 0.5);
@@ -74,6 +87,7 @@ impl Triangulation {
                 .flat_map(|f| halves(f, (a, b), middle));
             self.faces = split.collect();
         }
+        Ok(())
     }
 }
 
@@ -281,7 +295,11 @@ mod tests {
             .clone()
             .find(|(a, b)| joined(&triangulation, *a, *b))
             .unwrap();
-        triangulation.split_chords(8, |x, y| (x.min(y), x.max(y)) == (a, b));
+        triangulation
+            .split_chords(8, Budget::unlimited(), |x, y| {
+                (x.min(y), x.max(y)) == (a, b)
+            })
+            .unwrap();
         assert!(!joined(&triangulation, a, b));
         assert_eq!(triangulation.faces.len(), 8);
         let area: f64 = triangulation

@@ -5,6 +5,7 @@
 //! turn, and neighbouring teeth overlap in the plane. The patch needs the polygon for its triangles and rest lengths
 //! only, so to move a few corners by a fraction of an edge has no visible effect.
 
+use darn_budget::{Budget, Exhausted, Steps};
 use robust::{Coord, orient2d};
 use rstar::RTree;
 use rstar::primitives::{GeomWithData, Line};
@@ -13,24 +14,34 @@ use crate::mesh::Vec2;
 
 /// Most rounds of smoothing; each reaches one corner further along the rim than the one before.
 const ROUNDS: usize = 40;
+/// Nanoseconds of work an edge in a round.
+const EDGE_WORK: u64 = 500;
+/// Nanoseconds of work a pair of edges whose boxes meet.
+const PAIR_WORK: u64 = 50;
 
 /// The polygon with corners near crossings moved so that none is left, scene units. `None` when that does not help,
 /// because the polygon overlaps itself on a larger scale.
-pub(super) fn untangle(polygon: &[Vec2]) -> Option<Vec<Vec2>> {
+///
+/// # Errors
+/// `Exhausted`.
+pub(super) fn untangle(polygon: &[Vec2], budget: &Budget) -> Result<Option<Vec<Vec2>>, Exhausted> {
     let mut polygon = polygon.to_vec();
     for reach in 0..ROUNDS {
-        let tangled = crossed_edges(&polygon);
+        let tangled = crossed_edges(&polygon, budget)?;
         if tangled.is_empty() {
-            return Some(polygon);
+            return Ok(Some(polygon));
         }
         polygon = smoothed(&polygon, &near(&tangled, polygon.len(), reach));
     }
-    None
+    Ok(None)
 }
 
 /// Edges (k: from corner k to k + 1) that cross or touch another edge, or fold back onto a neighbour; to share a corner
 /// is no touch.
-fn crossed_edges(polygon: &[Vec2]) -> Vec<usize> {
+///
+/// # Errors
+/// `Exhausted`.
+fn crossed_edges(polygon: &[Vec2], budget: &Budget) -> Result<Vec<usize>, Exhausted> {
     let count = polygon.len();
     let ends = |k: usize| (polygon[k], polygon[(k + 1) % count]);
     let line = |k: usize| {
@@ -38,21 +49,29 @@ fn crossed_edges(polygon: &[Vec2]) -> Vec<usize> {
         GeomWithData::new(Line::new([a.x, a.y], [b.x, b.y]), k)
     };
     let tree = RTree::bulk_load((0..count).map(line).collect());
-    let meets = |k: &usize| {
-        use rstar::RTreeObject;
-        let (a, b) = ends(*k);
-        tree.locate_in_envelope_intersecting(&line(*k).envelope())
-            .any(|other| {
-                let (c, d) = ends(other.data);
-                match (other.data + count - k) % count {
-                    0 => false,
-                    1 => folds_back(a, b, d),
-                    after if after == count - 1 => folds_back(b, a, c),
-                    _ => segments_touch(a, b, c, d),
-                }
-            })
+    let meets = |k: usize, other: usize| {
+        let ((a, b), (c, d)) = (ends(k), ends(other));
+        match (other + count - k) % count {
+            0 => false,
+            1 => folds_back(a, b, d),
+            after if after == count - 1 => folds_back(b, a, c),
+            _ => segments_touch(a, b, c, d),
+        }
     };
-    (0..count).filter(meets).collect()
+    let mut steps = Steps::of(budget);
+    let mut crossed = Vec::new();
+    for k in 0..count {
+        use rstar::RTreeObject;
+        steps.take(EDGE_WORK)?;
+        for other in tree.locate_in_envelope_intersecting(&line(k).envelope()) {
+            steps.take(PAIR_WORK)?;
+            if meets(k, other.data) {
+                crossed.push(k);
+                break;
+            }
+        }
+    }
+    Ok(crossed)
 }
 
 /// Whether the edge from `b` to `c` lies on the edge from `b` to `a`.
@@ -124,7 +143,7 @@ mod tests {
 
     #[test]
     fn a_simple_polygon_stays_as_it_is() {
-        assert_eq!(untangle(&gear(40)), Some(gear(40)));
+        assert_eq!(untangle(&gear(40), Budget::unlimited()), Ok(Some(gear(40))));
     }
 
     #[test]
@@ -132,9 +151,17 @@ mod tests {
         let mut polygon = gear(40);
         polygon[7] = polygon[10];
         polygon[8] = polygon[5] * 1.01;
-        assert!(!crossed_edges(&polygon).is_empty());
-        let simple = untangle(&polygon).unwrap();
-        assert!(crossed_edges(&simple).is_empty());
+        assert!(
+            !crossed_edges(&polygon, Budget::unlimited())
+                .unwrap()
+                .is_empty()
+        );
+        let simple = untangle(&polygon, Budget::unlimited()).unwrap().unwrap();
+        assert!(
+            crossed_edges(&simple, Budget::unlimited())
+                .unwrap()
+                .is_empty()
+        );
         assert_eq!(
             simple[25], polygon[25],
             "corners far from the crossing stay"
@@ -145,6 +172,10 @@ mod tests {
     fn a_spike_folded_onto_itself_counts_as_crossing() {
         let spike = [(0.0, 0.0), (2.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
             .map(|(x, y)| Vec2::new(x, y));
-        assert!(!crossed_edges(&spike).is_empty());
+        assert!(
+            !crossed_edges(&spike, Budget::unlimited())
+                .unwrap()
+                .is_empty()
+        );
     }
 }

@@ -11,10 +11,11 @@ use super::cases::{EvaluationCase, extent};
 use super::hole_kind::{HoleKind, SCAN_SIDE};
 use crate::scarffolds::holed_scan::holed_scan;
 use crate::scarffolds::sheets::SimulatedSheet;
+use darn_budget::Budget;
 use darn_geometry::flatten::{self, Chart, FlattenLimits};
 use darn_geometry::grid::{CELLS, cell_centre};
 use darn_geometry::mesh::loops::{LoopKind, boundary_loops};
-use darn_geometry::mesh::region::{Region, grow};
+use darn_geometry::mesh::region::{BoundedMesh, Region, grow};
 use darn_geometry::mesh::topology::Topology;
 use darn_geometry::mesh::{TriMesh, Vec2};
 use darn_geometry::polygon::inside;
@@ -64,9 +65,15 @@ fn of_mesh(mesh: &TriMesh) -> Option<GridShares> {
     let loops = boundary_loops(mesh, &topology);
     let holes = loops.iter().filter(|l| l.kind == LoopKind::Hole);
     let rim = holes.max_by(|a, b| a.length.total_cmp(&b.length))?;
+    let whole = BoundedMesh {
+        mesh,
+        topology: &topology,
+        loops: &loops,
+    };
     let flatten_with = |reach: f64| {
-        let region = grow(mesh, &topology, &loops, rim.id, reach).ok()?;
-        let chart = flatten::flatten(&region, &FlattenLimits::default()).ok()?;
+        let region = grow(&whole, rim.id, reach, Budget::unlimited()).ok()?;
+        let chart =
+            flatten::flatten(&region, &FlattenLimits::default(), Budget::unlimited()).ok()?;
         Some((region, chart))
     };
     let reach = reach_for(rim.length / PI);

@@ -1,10 +1,11 @@
 //! A filled grid after `patch`: the known cells become a mesh whose chart is the grid itself, the mesh is patched, and the patch is read at
 //! the hole cells.
 
+use darn_budget::Budget;
 use darn_geometry::flatten::{Chart, UvSquare};
 use darn_geometry::grid::{CELLS, Grid, cell_centre};
 use darn_geometry::mesh::loops::boundary_loops;
-use darn_geometry::mesh::region::{Region, grow};
+use darn_geometry::mesh::region::{BoundedMesh, Region, grow};
 use darn_geometry::mesh::topology::Topology;
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
 use darn_geometry::patch::{self, Patch, PatchError, PatchOptions, signed_area};
@@ -30,6 +31,11 @@ pub(super) fn patched(
     };
     let topology = Topology::new(&mesh);
     let loops = boundary_loops(&mesh, &topology);
+    let whole = BoundedMesh {
+        mesh: &mesh,
+        topology: &topology,
+        loops: &loops,
+    };
     let mut answer = filled.to_vec();
     for rim in &loops {
         let polygon: Vec<Vec2> = rim
@@ -48,7 +54,7 @@ pub(super) fn patched(
         if own.is_empty() {
             continue;
         }
-        let Ok(region) = grow(&mesh, &topology, &loops, rim.id, f64::INFINITY) else {
+        let Ok(region) = grow(&whole, rim.id, f64::INFINITY, Budget::unlimited()) else {
             continue;
         };
         let chart = grid_chart(&region);

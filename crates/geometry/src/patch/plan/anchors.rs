@@ -1,15 +1,17 @@
 //! Pulls on a planned patch: where their forces act, and how far the patch follows them.
 
 use super::PatchPlan;
-use crate::cholesky::NotPositive;
+use darn_budget::{Budget, Exhausted};
+
+use crate::cholesky::SolveError;
 use crate::flatten::Chart;
 use crate::grid;
 use crate::mesh::{Vec2, Vec3};
-use crate::patch::energy::{StrainEnergy, StrainOptions};
-use crate::patch::forces::{AnchorForce, AnchorForces};
+use crate::patch::energy::StrainOptions;
+use crate::patch::forces::{AnchorForce, AnchorForces, gram_work};
 use crate::patch::locate;
 use crate::patch::pull::Pull;
-use crate::patch::strain::minimise;
+use crate::patch::strain::Minimisation;
 
 /// Radius of the disk that a pull acts on, in grid cells. A smaller disk raises a spike, which reaches the stretch
 /// limit sooner and stays farther from the target.
@@ -22,6 +24,8 @@ const MORE: f64 = 1.05;
 const RELAXATIONS: usize = 8;
 /// Most rounds of strain limiting between two relaxations.
 const ROUNDS: usize = 60;
+/// Nanoseconds of work a face in the search for a pull's place.
+const FACE_WORK: u64 = 5;
 
 /// The largest stretch that pulls may leave an edge with, given the largest one without them; both are length ÷ length
 /// in the chart.
@@ -30,31 +34,42 @@ pub fn stretch_limit(before: f64) -> f64 {
 }
 
 impl PatchPlan {
-    /// Moves the free vertices of a patch at rest so that the forces meet their targets, as far as the stretch limit
-    /// allows; returns the rounds of strain limiting.
+    /// Moves the free vertices of a patch at rest, which a minimisation without forces left at `positions`, so that the
+    /// forces meet their targets, as far as the stretch limit allows; returns the rounds of strain limiting.
     pub(super) fn apply_forces(
         &self,
-        energy: &StrainEnergy,
+        at_rest: &Minimisation,
         positions: &mut [Vec3],
         forces: &[AnchorForce],
-        options: &StrainOptions,
-    ) -> Result<usize, NotPositive> {
-        let Some(mut ready) = AnchorForces::new(energy, forces)? else {
+    ) -> Result<usize, SolveError> {
+        let Minimisation {
+            energy,
+            options,
+            budget,
+            ..
+        } = *at_rest;
+        let Some(mut ready) = AnchorForces::new(energy, forces, budget)? else {
             return Ok(0);
         };
         let start = positions.to_vec();
         let before = self.stretch(&start);
         let limit = stretch_limit(before);
         let target = energy.target_at(positions);
-        self.lift(positions, forces)?;
+        self.lift(positions, forces, budget)?;
         // Later rounds still move vertices, but by less than is visible.
-        let options = &StrainOptions {
+        let options = StrainOptions {
             max_rounds: ROUNDS.min(options.max_rounds),
-            ..*options
+            ..options
         };
         let mut rounds = 0;
         for _ in 0..=RELAXATIONS {
-            rounds += minimise(energy, &target, positions, Some(&ready), options)?;
+            let minimisation = Minimisation {
+                target: &target,
+                forces: Some(&ready),
+                options,
+                ..*at_rest
+            };
+            rounds += minimisation.run(positions)?;
             let stretch = self.stretch(positions);
             if stretch <= limit {
                 return Ok(rounds);
@@ -68,12 +83,16 @@ impl PatchPlan {
 
     /// The pulls as forces on a patch at `positions` (in the order of [`RimJoin`](crate::patch::rim_join::RimJoin)); a
     /// pull beside the hole gives none.
+    ///
+    /// # Errors
+    /// `Exhausted`.
     pub(super) fn forces(
         &self,
         pulls: &[Pull],
         chart: &Chart,
         positions: &[Vec3],
-    ) -> Vec<AnchorForce> {
+        budget: &Budget,
+    ) -> Result<Vec<AnchorForce>, Exhausted> {
         let radius = CONTACT_RADIUS * chart.frame.side / grid::SIDE as f64;
         let force = |pull: &Pull| {
             let triangulation = &self.triangulation;
@@ -101,7 +120,12 @@ impl PatchPlan {
                 limit: pull.firmness.strength() * radius,
             })
         };
-        pulls.iter().filter_map(force).collect()
+        let mut forces = Vec::new();
+        for pull in pulls {
+            budget.spend(FACE_WORK * self.triangulation.faces.len() as u64)?;
+            forces.extend(force(pull));
+        }
+        Ok(forces)
     }
 
     /// The inner vertices within `radius` of a point in the plane, with their shares of its force, largest in the
@@ -125,9 +149,15 @@ impl PatchPlan {
 
     /// Moves the patch so that its points meet their targets, by the smoothest displacement that is zero at the rim
     /// (biharmonic). Strain limiting then starts from a smooth bump and not from a spike.
-    fn lift(&self, positions: &mut [Vec3], forces: &[AnchorForce]) -> Result<(), NotPositive> {
+    fn lift(
+        &self,
+        positions: &mut [Vec3],
+        forces: &[AnchorForce],
+        budget: &Budget,
+    ) -> Result<(), SolveError> {
         let mut bumps = Vec::with_capacity(forces.len());
         for force in forces {
+            budget.spend(2 * self.rim_extension.solve_work())?;
             let mut bump = vec![[0.0]; self.free()];
             for (v, w) in &force.corners {
                 bump[*v][0] += w;
@@ -137,6 +167,7 @@ impl PatchPlan {
             bumps.push(bump);
         }
         let count = forces.len();
+        budget.spend_at_once(gram_work(count))?;
         let at = |force: &AnchorForce, bump: &[[f64; 1]]| -> f64 {
             force.corners.iter().map(|(v, w)| bump[*v][0] * w).sum()
         };
@@ -148,7 +179,9 @@ impl PatchPlan {
         for (k, force) in forces.iter().enumerate() {
             gaps.set_row(k, &force.gap.transpose());
         }
-        gram.cholesky().ok_or(NotPositive)?.solve_mut(&mut gaps);
+        gram.cholesky()
+            .ok_or(SolveError::NotPositive)?
+            .solve_mut(&mut gaps);
         for (k, bump) in bumps.iter().enumerate() {
             let gap = Vec3::new(gaps[(k, 0)], gaps[(k, 1)], gaps[(k, 2)]);
             (positions.iter_mut().zip(bump)).for_each(|(p, b)| *p += gap * b[0]);

@@ -7,9 +7,14 @@
 
 use std::collections::{HashMap, HashSet};
 
+use darn_budget::{Budget, Exhausted};
+
 use crate::mesh::{TriMesh, Vec2, Vec3};
 use crate::patch::triangulate::{self, Triangulation};
 use crate::patch::{PatchError, untangle};
+
+/// Nanoseconds of work a point in a triangulation.
+const POINT_WORK: u64 = 500;
 
 /// The distinct points of a rim and the edges between them. The index of a point is that of the first rim vertex there.
 pub(super) struct RimPoints {
@@ -42,12 +47,22 @@ impl RimPoints {
 
     /// Splits the chords of a piece between points that the scan or another piece joins already, then records the
     /// piece's own edges.
-    fn split_taken_chords(&mut self, part: &mut Triangulation, piece: &[usize]) {
+    ///
+    /// # Errors
+    /// `Exhausted`.
+    fn split_taken_chords(
+        &mut self,
+        part: &mut Triangulation,
+        piece: &[usize],
+        budget: &Budget,
+    ) -> Result<(), Exhausted> {
         let ends = |a: u32, b: u32| {
             let [a, b] = [a, b].map(|corner| self.line[piece[corner as usize]]);
             edge(a, b)
         };
-        part.split_chords(piece.len(), |a, b| self.joined.contains(&ends(a, b)));
+        part.split_chords(piece.len(), budget, |a, b| {
+            self.joined.contains(&ends(a, b))
+        })?;
         let between = |(a, b): &(u32, u32)| (*a.max(b) as usize) < piece.len();
         let own: Vec<(u32, u32)> = (part.faces.iter())
             .flat_map(sides)
@@ -55,6 +70,7 @@ impl RimPoints {
             .map(|(a, b)| ends(a, b))
             .collect();
         self.joined.extend(own);
+        Ok(())
     }
 }
 
@@ -71,39 +87,53 @@ fn edge(a: u32, b: u32) -> (u32, u32) {
     (a.min(b), a.max(b))
 }
 
+/// What a triangulation should be like, and what it may cost.
+pub(super) struct Asked<'a> {
+    /// Length of its edges, about, scene units.
+    pub spacing: f64,
+    /// Most inner points, about.
+    pub max_points: usize,
+    /// What it may cost.
+    pub budget: &'a Budget<'a>,
+}
+
 /// Triangulates the hole of a rim whose vertices lie at `rim` in the plane, counter-clockwise; they become the first
 /// points.
 ///
-/// Edges are about `spacing` long, scene units, and there are at most about `max_points` inner points. Pieces share no
-/// vertices: at a common point each has its own.
+/// Pieces share no vertices: at a common point each has its own.
 ///
 /// # Errors
-/// `RimCrosses` when a piece overlaps itself or no piece has an area.
+/// `RimCrosses` when a piece overlaps itself or no piece has an area; `Exhausted`.
 pub(super) fn triangulate_pieces(
     rim: Vec<Vec2>,
     mut rim_points: RimPoints,
-    spacing: f64,
-    max_points: usize,
+    asked: &Asked,
 ) -> Result<Triangulation, PatchError> {
+    let Asked {
+        spacing,
+        max_points,
+        budget,
+    } = *asked;
     let mut whole = Triangulation {
         points: with_common_points(rim, &rim_points.line),
         faces: Vec::new(),
     };
     let pieces = simple_pieces(&rim_points.line);
-    let polygon = |piece: &Vec<usize>| -> Option<Vec<Vec2>> {
+    let polygon = |piece: &Vec<usize>| -> Result<Vec<Vec2>, PatchError> {
         let corners: Vec<Vec2> = piece.iter().map(|k| whole.points[*k]).collect();
-        untangle::untangle(&corners)
+        untangle::untangle(&corners, budget)?.ok_or(PatchError::RimCrosses)
     };
-    let polygons: Option<Vec<Vec<Vec2>>> = pieces.iter().map(polygon).collect();
-    let polygons = polygons
-        .filter(|all| !all.is_empty())
-        .ok_or(PatchError::RimCrosses)?;
+    let polygons: Vec<Vec<Vec2>> = (pieces.iter().map(polygon)).collect::<Result<_, _>>()?;
+    if polygons.is_empty() {
+        return Err(PatchError::RimCrosses);
+    }
     let area = |polygon: &Vec<Vec2>| triangulate::signed_area(polygon);
     let whole_area: f64 = polygons.iter().map(area).sum();
     for (piece, polygon) in pieces.iter().zip(&polygons) {
         let max_points = (max_points as f64 * (area(polygon) / whole_area)) as usize;
+        budget.spend(POINT_WORK * (polygon.len() + max_points) as u64)?;
         let mut part = triangulate::triangulate(polygon, spacing, max_points)?;
-        rim_points.split_taken_chords(&mut part, piece);
+        rim_points.split_taken_chords(&mut part, piece, budget)?;
         append(&mut whole, &part, piece);
     }
     Ok(whole)

@@ -1,0 +1,332 @@
+//! What one request may still cost: time, work, memory and the size of its answer.
+//!
+//! Every loop whose length the input decides asks the request's [`Budget`]. Time and cancellation depend on the clock and the caller.
+//! Work, memory and output are counted from the input alone, so that the same request is always refused or always answered.
+
+mod memory;
+mod work;
+
+pub use memory::{Memory, MemoryPool};
+pub use work::{NANOSECONDS_PER_SECOND, Steps};
+
+use std::fmt;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering::Relaxed};
+use std::time::{Duration, Instant};
+
+/// Why a request ends before its answer.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Exhausted {
+    /// The caller has left, or the deadline has passed or would pass before the next step ends.
+    #[error("nobody waits for the answer any more")]
+    Cancelled,
+    /// The request needs more work than its size allows.
+    #[error(
+        "the request needs more than the {seconds:.1} s of work that are allowed for its size; \
+         send fewer constraints or holes at once, or a scan with fewer triangles around its holes"
+    )]
+    Work {
+        /// Work allowed, in seconds of one core.
+        seconds: f64,
+    },
+    /// The request needs more memory than its size allows.
+    #[error(
+        "the request needs more than the {} MiB of memory that are allowed for its size; choose fewer holes at once by `holes`",
+        .limit >> 20
+    )]
+    Memory {
+        /// Bytes allowed.
+        limit: usize,
+    },
+    /// All requests together need more memory than the service may take.
+    #[error("the service's memory of {} MiB is taken by other requests", .limit >> 20)]
+    MemoryFull {
+        /// Bytes that all requests together may take.
+        limit: usize,
+    },
+    /// The answer would be larger than its limit.
+    #[error("the answer would be larger than {} MiB", .limit >> 20)]
+    Output {
+        /// Bytes allowed.
+        limit: usize,
+    },
+}
+
+/// The limits of a request; each is without bound unless set.
+#[derive(Debug, Clone)]
+pub struct Limits {
+    /// When the answer comes too late.
+    pub deadline: Option<Instant>,
+    /// Work in nanoseconds of one core, as the code estimates it.
+    pub work: u64,
+    /// Bytes of memory that the request may hold at once, as the code estimates them.
+    pub memory: usize,
+    /// Bytes of the answer.
+    pub output: usize,
+    /// The memory that all requests share.
+    pub pool: Option<Arc<MemoryPool>>,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Limits {
+            deadline: None,
+            work: u64::MAX,
+            memory: usize::MAX,
+            output: usize::MAX,
+            pool: None,
+        }
+    }
+}
+
+/// What one request may still cost. Shared by reference between the threads that work for it.
+pub struct Budget<'a> {
+    limits: Limits,
+    cancelled: &'a (dyn Fn() -> bool + Sync),
+    spent: AtomicU64,
+    held: AtomicUsize,
+}
+
+/// A request without limits that is never cancelled.
+static UNLIMITED: Budget<'static> = Budget {
+    limits: Limits {
+        deadline: None,
+        work: u64::MAX,
+        memory: usize::MAX,
+        output: usize::MAX,
+        pool: None,
+    },
+    cancelled: &|| false,
+    spent: AtomicU64::new(0),
+    held: AtomicUsize::new(0),
+};
+
+impl<'a> Budget<'a> {
+    /// A budget within limits, for a caller who waits until `cancelled` returns true. `cancelled` is cheap and may be called from any
+    /// thread.
+    pub fn new(limits: Limits, cancelled: &'a (dyn Fn() -> bool + Sync)) -> Budget<'a> {
+        Budget {
+            limits,
+            cancelled,
+            spent: AtomicU64::new(0),
+            held: AtomicUsize::new(0),
+        }
+    }
+
+    /// The budget of a command that a person runs: no limits, never cancelled.
+    pub fn unlimited() -> &'static Budget<'static> {
+        &UNLIMITED
+    }
+
+    /// The limits.
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// Checks that the answer is still waited for.
+    ///
+    /// # Errors
+    /// `Cancelled`.
+    pub fn check(&self) -> Result<(), Exhausted> {
+        let late = self.limits.deadline.is_some_and(|at| Instant::now() >= at);
+        if late || (self.cancelled)() {
+            return Err(Exhausted::Cancelled);
+        }
+        Ok(())
+    }
+
+    /// Takes work, in nanoseconds of one core, and checks that the answer is still waited for. Call it before a step whose cost is
+    /// known, or after each few thousand small ones ([`Steps`] counts those).
+    ///
+    /// # Errors
+    /// `Work`, `Cancelled`.
+    pub fn spend(&self, nanoseconds: u64) -> Result<(), Exhausted> {
+        // Without a limit nothing is counted: the shared budget of commands would overflow in the end.
+        if self.limits.work != u64::MAX {
+            let before = self.spent.fetch_add(nanoseconds, Relaxed);
+            if before.saturating_add(nanoseconds) > self.limits.work {
+                return Err(Exhausted::Work {
+                    seconds: self.limits.work as f64 / NANOSECONDS_PER_SECOND,
+                });
+            }
+        }
+        self.check()
+    }
+
+    /// [`Budget::spend`] before a step that cannot be interrupted: ends the request at once when the step would end after the deadline.
+    ///
+    /// # Errors
+    /// `Work`, `Cancelled`.
+    pub fn spend_at_once(&self, nanoseconds: u64) -> Result<(), Exhausted> {
+        self.spend(nanoseconds)?;
+        let end = self
+            .limits
+            .deadline
+            .zip(Instant::now().checked_add(Duration::from_nanos(nanoseconds)));
+        match end {
+            Some((deadline, end)) if end > deadline => Err(Exhausted::Cancelled),
+            _ => Ok(()),
+        }
+    }
+
+    /// Work taken so far, in nanoseconds of one core; 0 without a limit.
+    pub fn spent(&self) -> u64 {
+        self.spent.load(Relaxed)
+    }
+
+    /// Counts memory that the request holds until it ends.
+    ///
+    /// # Errors
+    /// `Memory`, `MemoryFull`.
+    pub fn hold(&self, bytes: usize) -> Result<(), Exhausted> {
+        if self.limits.memory == usize::MAX && self.limits.pool.is_none() {
+            return Ok(());
+        }
+        let before = self.held.fetch_add(bytes, Relaxed);
+        let limit = self.limits.memory;
+        let taken = match &self.limits.pool {
+            _ if before.saturating_add(bytes) > limit => Err(Exhausted::Memory { limit }),
+            Some(pool) if !pool.grow(bytes) => Err(Exhausted::MemoryFull {
+                limit: pool.limit(),
+            }),
+            _ => return Ok(()),
+        };
+        self.held.fetch_sub(bytes, Relaxed);
+        taken
+    }
+
+    /// Gives back memory counted by [`Budget::hold`].
+    pub fn release(&self, bytes: usize) {
+        if self.limits.memory == usize::MAX && self.limits.pool.is_none() {
+            return;
+        }
+        let before = self.held.fetch_sub(bytes, Relaxed);
+        debug_assert!(before >= bytes, "more is released than was held");
+        if let Some(pool) = &self.limits.pool {
+            pool.shrink(bytes);
+        }
+    }
+
+    /// Checks the size of an answer, in bytes.
+    ///
+    /// # Errors
+    /// `Output`.
+    pub fn check_output(&self, bytes: usize) -> Result<(), Exhausted> {
+        let limit = self.limits.output;
+        if bytes > limit {
+            return Err(Exhausted::Output { limit });
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Budget<'_> {
+    fn drop(&mut self) {
+        if let Some(pool) = &self.limits.pool {
+            pool.shrink(self.held.load(Relaxed));
+        }
+    }
+}
+
+impl fmt::Debug for Budget<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Budget")
+            .field("limits", &self.limits)
+            .field("spent", &self.spent)
+            .field("held", &self.held)
+            .finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn budget(limits: Limits) -> Budget<'static> {
+        Budget::new(limits, &|| false)
+    }
+
+    #[test]
+    fn a_caller_who_left_ends_every_step() {
+        let left = Budget::new(Limits::default(), &|| true);
+        assert_eq!(left.check(), Err(Exhausted::Cancelled));
+        assert_eq!(left.spend(1), Err(Exhausted::Cancelled));
+    }
+
+    #[test]
+    fn a_step_that_would_end_after_the_deadline_is_not_begun() {
+        let soon = Instant::now() + Duration::from_secs(60);
+        let limits = Limits {
+            deadline: Some(soon),
+            ..Limits::default()
+        };
+        let budget = budget(limits);
+        assert_eq!(budget.spend_at_once(1_000_000_000), Ok(()));
+        assert_eq!(
+            budget.spend_at_once(120_000_000_000),
+            Err(Exhausted::Cancelled)
+        );
+        assert_eq!(budget.spend(120_000_000_000), Ok(()));
+    }
+
+    #[test]
+    fn memory_of_a_pool_comes_back_when_the_request_ends() {
+        let pool = MemoryPool::new(100);
+        let limits = Limits {
+            pool: Some(Arc::clone(&pool)),
+            memory: 80,
+            ..Limits::default()
+        };
+        let first = budget(limits.clone());
+        let second = budget(limits);
+        assert_eq!(first.hold(70), Ok(()));
+        assert_eq!(first.hold(20), Err(Exhausted::Memory { limit: 80 }));
+        assert_eq!(second.hold(40), Err(Exhausted::MemoryFull { limit: 100 }));
+        assert_eq!(pool.used(), 70);
+        first.release(30);
+        assert_eq!(second.hold(40), Ok(()));
+        drop(first);
+        assert_eq!(pool.used(), 40);
+        drop(second);
+        assert_eq!(pool.used(), 0);
+    }
+
+    #[test]
+    fn without_limits_nothing_is_counted() {
+        let unlimited = Budget::unlimited();
+        assert_eq!(unlimited.spend(u64::MAX), Ok(()));
+        assert_eq!(unlimited.hold(usize::MAX), Ok(()));
+        assert_eq!(unlimited.check_output(usize::MAX), Ok(()));
+        assert_eq!(unlimited.spent(), 0);
+    }
+
+    proptest! {
+        #[test]
+        fn work_is_refused_exactly_when_its_sum_exceeds_the_limit(
+            limit in 0..1000u64, steps in prop::collection::vec(0..100u64, 0..40)
+        ) {
+            let budget = budget(Limits { work: limit, ..Limits::default() });
+            let mut sum = 0;
+            for step in steps {
+                sum += step;
+                prop_assert_eq!(budget.spend(step).is_err(), sum > limit);
+            }
+        }
+
+        #[test]
+        fn memory_within_the_limit_is_granted_and_refusals_take_nothing(
+            limit in 0..1000usize, steps in prop::collection::vec(0..400usize, 0..40)
+        ) {
+            let budget = budget(Limits { memory: limit, ..Limits::default() });
+            let mut sum = 0;
+            for step in steps {
+                let fits = sum + step <= limit;
+                prop_assert_eq!(budget.hold(step).is_ok(), fits);
+                if fits {
+                    sum += step;
+                }
+            }
+        }
+    }
+}

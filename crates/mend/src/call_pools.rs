@@ -1,0 +1,88 @@
+//! Threads for the parallel work of calls, apart for each call that runs.
+//!
+//! With one pool for all calls, the small steps of a small mend would wait behind the large ones of others: a thread of rayon takes no new
+//! work before its own list is empty. With a pool for each, the operating system shares the processors between calls.
+
+use std::sync::{Mutex, PoisonError};
+
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+/// Most threads of a call. Mends gain little beyond it, and a machine with many processors runs many calls.
+const MAX_THREADS: usize = 8;
+
+/// Thread pools of calls; one that is not in use is kept for the next call.
+#[derive(Debug)]
+pub struct CallPools {
+    threads: usize,
+    idle: Mutex<Vec<ThreadPool>>,
+}
+
+impl Default for CallPools {
+    /// Pools with as many threads as rayon's global one, but no more than eight.
+    fn default() -> CallPools {
+        CallPools {
+            threads: rayon::current_num_threads().min(MAX_THREADS),
+            idle: Mutex::default(),
+        }
+    }
+}
+
+impl CallPools {
+    /// Runs a call whose parallel work has its own threads; on the global pool where the system gives no more threads. The result does not
+    /// depend on where it runs.
+    pub fn run<T: Send>(&self, call: impl FnOnce() -> T + Send) -> T {
+        let kept = self.idle().pop();
+        let pool = kept.or_else(|| {
+            let threads = ThreadPoolBuilder::new().num_threads(self.threads);
+            let named = threads.thread_name(|k| format!("call-{k}"));
+            named.build().ok()
+        });
+        let Some(pool) = pool else {
+            return call();
+        };
+        let outcome = pool.install(call);
+        self.idle().push(pool);
+        outcome
+    }
+
+    fn idle(&self) -> std::sync::MutexGuard<'_, Vec<ThreadPool>> {
+        // No change under the lock can panic half-way.
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc;
+    use std::thread;
+
+    use rayon::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn a_call_does_not_wait_for_the_parallel_work_of_another() {
+        let pools = CallPools::default();
+        let (release, released) = mpsc::channel::<()>();
+        let (begun, has_begun) = mpsc::channel();
+        let released = Mutex::new(released);
+        thread::scope(|scope| {
+            let pools = &pools;
+            let released = &released;
+            scope.spawn(move || {
+                pools.run(|| {
+                    // Holds every thread of its pool.
+                    (0..2 * MAX_THREADS).into_par_iter().for_each(|_| {
+                        begun.send(()).ok();
+                        released.lock().unwrap().recv().ok();
+                    });
+                });
+            });
+            has_begun.recv().unwrap();
+            let sum: usize = pools.run(|| (0..1000usize).into_par_iter().sum());
+            assert_eq!(sum, 499_500);
+            drop(release);
+        });
+        assert_eq!(pools.idle().len(), 2);
+    }
+}
