@@ -2,15 +2,11 @@
 
 #![forbid(unsafe_code)]
 
+mod allocator;
 mod cli;
 mod settings;
 
 use std::process::ExitCode;
-
-use mimalloc::MiMalloc;
-
-#[global_allocator]
-static ALLOCATOR: MiMalloc = MiMalloc;
 
 fn main() -> ExitCode {
     cli::main()

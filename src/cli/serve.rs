@@ -2,6 +2,7 @@
 
 use super::failure::{Failure, OrFail};
 use super::network;
+use crate::allocator;
 use crate::settings::ServeCommand;
 use darn_mend::{NetworkMender, SharedMender};
 use darn_serve::{LogDelivery, LogError, start_logging};
@@ -25,6 +26,7 @@ pub fn run(settings: &ServeCommand) -> Result<(), Failure> {
         .num_threads(settings.threads.unwrap_or(0))
         .build_global())
     .or_fail("start the threads that workers share (DARN_THREADS)")?;
+    allocator::give_back_when_idle();
     let mender = NetworkMender {
         scan_limits: settings.scan_limits(),
         ..network::mender(&settings.network)?

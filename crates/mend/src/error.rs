@@ -179,7 +179,8 @@ impl MendError {
                 Exhausted::Memory { .. } => codes::TOO_MUCH_MEMORY,
                 Exhausted::MemoryFull { .. } => codes::MEMORY_FULL,
                 Exhausted::Output { .. } => codes::ANSWER_TOO_LARGE,
-                Exhausted::Cancelled => codes::INTERNAL,
+                // A caller who has left reads no code; one who still waits would wait for longer than the deadline.
+                Exhausted::Cancelled => codes::DEADLINE_EXCEEDED,
             },
             MendError::Net(_) | MendError::Scan(_) | MendError::Picture(_) => codes::INTERNAL,
         }

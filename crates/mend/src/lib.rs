@@ -211,6 +211,22 @@ mod tests {
     }
 
     #[test]
+    fn a_step_that_would_end_after_the_deadline_is_a_matter_of_the_deadline() {
+        let scan = scan_of(&tangle(16));
+        let limits = Limits {
+            deadline: Some(Instant::now() + std::time::Duration::from_millis(1)),
+            ..Limits::default()
+        };
+        let budget = Budget::new(limits, &|| false);
+        let call = Call {
+            mender: mender(),
+            budget: &budget,
+        };
+        let error = mend(&scan, &Constraints::default(), call).unwrap_err();
+        assert_eq!(error.code(), darn_contract::codes::DEADLINE_EXCEEDED);
+    }
+
+    #[test]
     fn holes_take_memory_within_the_limit_or_are_refused() {
         let keep = |u: f64, v: f64| {
             let near = |x: f64| (x * 4.0).fract() - 0.5;

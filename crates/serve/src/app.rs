@@ -29,6 +29,7 @@ use super::{
     uploads::{BodySize, Sharing, UploadRefusal, UploadSlot, Uploads},
 };
 use darn_budget::{Budget, Limits, MemoryPool};
+use darn_contract::codes;
 use darn_contract::port::{Mender, Refusal};
 
 /// Work that a request may cost for each byte of its scan, in nanoseconds of one core. Mends of real scans take up to 1,500.
@@ -322,6 +323,10 @@ impl App {
                 let code = refusal.code.word;
                 error!(code, detail = refusal.detail, "mending failed");
                 Err(RequestError::Internal)
+            }
+            // The next step would have ended after the deadline, so it was not begun.
+            Ok(Err(refusal)) if refusal.code == codes::DEADLINE_EXCEEDED => {
+                Err(of_pool(PoolError::Expired, deadline.length))
             }
             Ok(Err(refusal)) => Err(RequestError::Refused(refusal)),
             Err(error) => Err(of_pool(error, deadline.length)),
