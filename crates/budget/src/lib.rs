@@ -195,6 +195,11 @@ impl<'a> Budget<'a> {
         taken
     }
 
+    /// Bytes of memory counted now; 0 without limits.
+    pub fn held(&self) -> usize {
+        self.held.load(Relaxed)
+    }
+
     /// Gives back memory counted by [`Budget::hold`].
     pub fn release(&self, bytes: usize) {
         if self.limits.memory == usize::MAX && self.limits.pool.is_none() {

@@ -5,10 +5,13 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use darn_budget::Budget;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// Most threads of a call. Mends gain little beyond it, and a machine with many processors runs many calls.
 const MAX_THREADS: usize = 8;
+/// Calls that hold this many bytes are large.
+const LARGE: usize = 32 << 20;
 
 /// Thread pools of calls; one that is not in use is kept for the next call.
 #[derive(Debug)]
@@ -30,7 +33,7 @@ impl Default for CallPools {
 impl CallPools {
     /// Runs a call whose parallel work has its own threads; on the global pool where the system gives no more threads. The result does not
     /// depend on where it runs.
-    pub fn run<T: Send>(&self, call: impl FnOnce() -> T + Send) -> T {
+    pub fn run<T: Send>(&self, budget: &Budget, call: impl FnOnce() -> T + Send) -> T {
         let kept = self.idle().pop();
         let pool = kept.or_else(|| {
             let threads = ThreadPoolBuilder::new().num_threads(self.threads);
@@ -41,7 +44,10 @@ impl CallPools {
             return call();
         };
         let outcome = pool.install(call);
-        self.idle().push(pool);
+        // The allocator keeps freed memory for each thread: after a large call the threads end, and their memory is free for all.
+        if budget.held() < LARGE {
+            self.idle().push(pool);
+        }
         outcome
     }
 
@@ -70,7 +76,7 @@ mod tests {
             let pools = &pools;
             let released = &released;
             scope.spawn(move || {
-                pools.run(|| {
+                pools.run(Budget::unlimited(), || {
                     // Holds every thread of its pool.
                     (0..2 * MAX_THREADS).into_par_iter().for_each(|_| {
                         begun.send(()).ok();
@@ -79,7 +85,8 @@ mod tests {
                 });
             });
             has_begun.recv().unwrap();
-            let sum: usize = pools.run(|| (0..1000usize).into_par_iter().sum());
+            let sum: usize =
+                pools.run(Budget::unlimited(), || (0..1000usize).into_par_iter().sum());
             assert_eq!(sum, 499_500);
             drop(release);
         });

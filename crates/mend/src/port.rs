@@ -45,7 +45,7 @@ impl Mender for SharedMender {
         constraints: &Constraints,
         budget: &Budget<'_>,
     ) -> Result<Mended, Refusal> {
-        self.0.pools.run(|| {
+        self.0.pools.run(budget, || {
             let (scan, read) = self.scan(scan, budget)?;
             let mut mended = crate::mend(&scan, constraints, self.call(budget)).map_err(refusal)?;
             add_read_time(&mut mended.report.timings, read);
@@ -59,7 +59,7 @@ impl Mender for SharedMender {
         search: &Search,
         budget: &Budget<'_>,
     ) -> Result<v1::AnchorFound, Refusal> {
-        self.0.pools.run(|| {
+        self.0.pools.run(budget, || {
             let (scan, _) = self.scan(scan, budget)?;
             crate::optimize_anchor(&scan, search, self.call(budget)).map_err(refusal)
         })
@@ -71,7 +71,7 @@ impl Mender for SharedMender {
         search: &Search,
         budget: &Budget<'_>,
     ) -> Result<Mended, Refusal> {
-        self.0.pools.run(|| {
+        self.0.pools.run(budget, || {
             let (scan, read) = self.scan(scan, budget)?;
             let mut mended =
                 crate::mend_to_target(&scan, search, self.call(budget)).map_err(refusal)?;
@@ -86,7 +86,7 @@ impl Mender for SharedMender {
         constraints: &Constraints,
         budget: &Budget<'_>,
     ) -> Result<Box<dyn EditSession>, Refusal> {
-        let session = self.0.pools.run(|| {
+        let session = self.0.pools.run(budget, || {
             let (scan, _) = self.scan(scan, budget)?;
             ScanSession::open(scan, constraints, Arc::clone(&self.0), budget).map_err(refusal)
         })?;
@@ -94,7 +94,7 @@ impl Mender for SharedMender {
     }
 
     fn find_holes(&self, scan: Bytes, budget: &Budget<'_>) -> Result<v1::HolesReport, Refusal> {
-        self.0.pools.run(|| {
+        self.0.pools.run(budget, || {
             let (scan, read) = self.scan(scan, budget)?;
             let mut found = crate::find_holes(&scan, budget).map_err(refusal)?;
             add_read_time(&mut found.timings, read);
@@ -128,7 +128,7 @@ impl EditSession for ScanSession {
         budget: &Budget<'_>,
     ) -> Result<Patches, Refusal> {
         let call = self.call(budget);
-        let (bytes, report) = self.pools().run(|| match form {
+        let (bytes, report) = self.pools().run(budget, || match form {
             PatchForm::Glb => call.glb(constraints).map_err(refusal),
             PatchForm::Positions => {
                 let (positions, report) = call.positions(constraints).map_err(refusal)?;
@@ -141,7 +141,9 @@ impl EditSession for ScanSession {
     }
 
     fn mended(&self, constraints: &Constraints, budget: &Budget<'_>) -> Result<Mended, Refusal> {
-        let mended = self.pools().run(|| self.call(budget).mended(constraints));
+        let mended = self
+            .pools()
+            .run(budget, || self.call(budget).mended(constraints));
         mended.map_err(refusal)
     }
 
@@ -150,7 +152,7 @@ impl EditSession for ScanSession {
         search: &Search,
         budget: &Budget<'_>,
     ) -> Result<v1::AnchorFound, Refusal> {
-        let found = (self.pools()).run(|| self.call(budget).optimize_anchor(search));
+        let found = (self.pools()).run(budget, || self.call(budget).optimize_anchor(search));
         found.map_err(refusal)
     }
 }
