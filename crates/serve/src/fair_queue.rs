@@ -21,9 +21,15 @@ pub(crate) struct FairQueue<T> {
     time: u64,
     /// How many jobs have come.
     come: u64,
-    /// Most jobs of one client that run at once.
-    running_limit: usize,
+    /// Most large jobs that run at once, in all and of one client.
+    large_limit: usize,
+    large_limit_of_client: usize,
+    /// Large jobs that run.
+    large_running: usize,
 }
+
+/// Jobs of at least this cost are large: they leave workers to small ones.
+const LARGE: u64 = 500_000;
 
 #[derive(Debug)]
 struct Waiting<T> {
@@ -31,7 +37,22 @@ struct Waiting<T> {
     /// Among equal tags the first job starts first.
     number: u64,
     client: Client,
+    size: JobClass,
     job: T,
+}
+
+/// Whether a job is large.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum JobClass {
+    Small,
+    Large,
+}
+
+/// A job that has started; to be given back to [`FairQueue::ended`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Started {
+    client: Client,
+    size: JobClass,
 }
 
 /// The jobs of a client.
@@ -39,17 +60,26 @@ struct Waiting<T> {
 struct Load {
     waiting: usize,
     running: usize,
+    /// Large ones among those that run.
+    large_running: usize,
 }
 
 impl<T> FairQueue<T> {
-    /// An empty queue in front of workers of which one client may use `running_limit`.
-    pub(crate) fn new(running_limit: usize) -> Self {
+    /// An empty queue in front of workers of which large jobs may use `large_limit`; where that is more than two, those of one client one fewer.
+    pub(crate) fn new(large_limit: usize) -> Self {
+        let large_limit = large_limit.max(1);
         Self {
             waiting: Vec::new(),
             loads: HashMap::new(),
             time: 0,
             come: 0,
-            running_limit: running_limit.max(1),
+            large_limit,
+            large_limit_of_client: if large_limit > 2 {
+                large_limit - 1
+            } else {
+                large_limit
+            },
+            large_running: 0,
         }
     }
 
@@ -67,38 +97,58 @@ impl<T> FairQueue<T> {
             tag: self.time.saturating_add(cost.saturating_mul(jobs)),
             number: self.come,
             client,
+            size: if cost < LARGE {
+                JobClass::Small
+            } else {
+                JobClass::Large
+            },
             job,
         });
         self.come += 1;
     }
 
-    /// Takes the next job that may start; its client has one more running until [`FairQueue::ended`] is called.
-    pub(crate) fn pop(&mut self) -> Option<(Client, T)> {
-        let (loads, limit) = (&self.loads, self.running_limit);
+    /// Takes the next job that may start; it counts as running until [`FairQueue::ended`] is called.
+    pub(crate) fn pop(&mut self) -> Option<(Started, T)> {
+        let large_of = |client: &Client| {
+            self.loads
+                .get(client)
+                .map_or(0, |load: &Load| load.large_running)
+        };
         let may_start = |job: &Waiting<T>| {
-            loads
-                .get(&job.client)
-                .is_none_or(|load| load.running < limit)
+            job.size == JobClass::Small
+                || (self.large_running < self.large_limit
+                    && large_of(&job.client) < self.large_limit_of_client)
         };
         let next = (self.waiting.iter().enumerate())
             .filter(|(_, job)| may_start(job))
             .min_by_key(|(_, job)| (job.tag, job.number))
             .map(|(index, _)| index)?;
         let Waiting {
-            tag, client, job, ..
+            tag,
+            client,
+            size,
+            job,
+            ..
         } = self.waiting.swap_remove(next);
         self.time = self.time.max(tag);
+        let large = usize::from(size == JobClass::Large);
+        self.large_running += large;
         if let Some(load) = self.loads.get_mut(&client) {
             load.waiting -= 1;
             load.running += 1;
+            load.large_running += large;
         }
-        Some((client, job))
+        Some((Started { client, size }, job))
     }
 
-    /// A job of this client has ended.
-    pub(crate) fn ended(&mut self, client: Client) {
+    /// A job has ended.
+    pub(crate) fn ended(&mut self, started: Started) {
+        let Started { client, size } = started;
+        let large = usize::from(size == JobClass::Large);
+        self.large_running -= large;
         if let Some(load) = self.loads.get_mut(&client) {
             load.running -= 1;
+            load.large_running -= large;
         }
         self.forget_idle(client);
     }
@@ -142,9 +192,9 @@ mod tests {
     /// The jobs in the order in which one worker starts them.
     fn order(mut queue: FairQueue<u32>) -> Vec<u32> {
         let mut order = Vec::new();
-        while let Some((client, job)) = queue.pop() {
+        while let Some((started, job)) = queue.pop() {
             order.push(job);
-            queue.ended(client);
+            queue.ended(started);
         }
         order
     }
@@ -164,14 +214,15 @@ mod tests {
         let mut queue = FairQueue::new(1);
         (0..8).for_each(|job| queue.push(client(1), 1000, job));
         queue.push(client(1), 10, 100);
-        assert_eq!(queue.pop(), Some((client(1), 100)));
-        queue.ended(client(1));
+        let (started, job) = queue.pop().unwrap();
+        assert_eq!(job, 100);
+        queue.ended(started);
         // Small jobs keep coming: the first large one starts after about as much work as it costs itself.
         let mut passed = 0;
         loop {
             queue.push(client(2), 10, 200);
             match queue.pop() {
-                Some((client, 200)) => queue.ended(client),
+                Some((started, 200)) => queue.ended(started),
                 _ => break,
             }
             passed += 1;
@@ -180,15 +231,24 @@ mod tests {
     }
 
     #[test]
-    fn one_client_leaves_a_worker_to_others() {
+    fn large_jobs_leave_workers_to_small_ones_and_to_other_clients() {
         let mut queue = FairQueue::new(3);
-        (0..5).for_each(|job| queue.push(client(1), 10, job));
-        let started = (0..5).filter_map(|_| queue.pop()).count();
-        assert_eq!(started, 3);
-        queue.push(client(2), 1_000_000, 100);
-        assert_eq!(queue.pop(), Some((client(2), 100)));
+        (0..5).for_each(|job| queue.push(client(1), LARGE, job));
+        let mut started: Vec<Started> = Vec::new();
+        while let Some((large, _)) = queue.pop() {
+            started.push(large);
+        }
+        assert_eq!(started.len(), 2);
+        queue.push(client(2), LARGE, 100);
+        let (other, job) = queue.pop().unwrap();
+        assert_eq!(job, 100);
+        // The small job of a client whose large ones run and wait.
+        queue.push(client(1), 10, 200);
+        assert_eq!(queue.pop().map(|(_, job)| job), Some(200));
         assert_eq!(queue.pop(), None);
-        queue.ended(client(1));
+        queue.ended(other);
+        assert_eq!(queue.pop(), None);
+        queue.ended(started[0]);
         assert!(queue.pop().is_some());
     }
 
@@ -219,9 +279,9 @@ mod tests {
             }
             let unwanted = queue.take_unwanted(|keep| *keep);
             prop_assert_eq!(unwanted.len() + queue.len(), wanted.len());
-            while let Some((client, keep)) = queue.pop() {
+            while let Some((started, keep)) = queue.pop() {
                 prop_assert!(keep);
-                queue.ended(client);
+                queue.ended(started);
             }
             prop_assert!(queue.loads.is_empty());
         }

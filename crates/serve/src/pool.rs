@@ -21,7 +21,7 @@ use tokio::{
 use tracing::Span;
 
 use super::{
-    fair_queue::{Client, FairQueue},
+    fair_queue::{Client, FairQueue, Started},
     job::{Job, JobOrder, PoolError, QueuedJob},
     telemetry::PoolMetrics,
 };
@@ -29,7 +29,7 @@ use darn_budget::Budget;
 
 /// Longest wait suggested to a caller, in seconds.
 const MAX_RETRY_AFTER: u64 = 120;
-/// One client leaves one in this many places, and as many workers, to others.
+/// One client leaves one in this many places to others, and large jobs as many workers to small ones.
 const SHARE_OF_OTHERS: usize = 4;
 
 /// The queue and its workers. Dropping it closes the queue; running jobs run to their end.
@@ -260,7 +260,7 @@ impl Shared {
     }
 
     /// Waits for the next job; `None` once the queue is closed and empty.
-    fn next(&self) -> Option<(Client, Box<dyn QueuedJob>)> {
+    fn next(&self) -> Option<(Started, Box<dyn QueuedJob>)> {
         let mut queue = self.lock();
         loop {
             if let Some(next) = queue.jobs.pop() {
@@ -279,10 +279,10 @@ impl Shared {
 
     /// A worker thread: runs jobs until the queue is closed and empty.
     fn run_jobs(&self) {
-        while let Some((client, job)) = self.next() {
+        while let Some((started, job)) = self.next() {
             self.run_job(job);
-            self.lock().jobs.ended(client);
-            // Jobs of this client may have waited for it to end, and workers for such jobs.
+            self.lock().jobs.ended(started);
+            // Large jobs may have waited for it to end, and workers for such jobs.
             self.filled.notify_all();
         }
     }
