@@ -77,34 +77,6 @@ pub(crate) struct VertexBlock {
     pub local: Vec<[f32; 3]>,
 }
 
-/// Bytes of memory that a parsed JSON value takes: its own place, and what it has allocated. Counted, since a list of empty lists takes
-/// sixty times as much as its text.
-pub(crate) fn json_held(json: &Value) -> usize {
-    // A map's entry: its key, its value, their hash, and its place in the table of the map.
-    const ENTRY: usize = size_of::<String>() + size_of::<Value>() + 2 * size_of::<usize>();
-    let (mut held, mut open) = (size_of::<Value>(), vec![json]);
-    while let Some(value) = open.pop() {
-        match value {
-            Value::Null | Value::Bool(_) => {}
-            // Numbers keep their text.
-            Value::Number(number) => held += number.as_str().len(),
-            Value::String(text) => held += text.capacity(),
-            Value::Array(items) => {
-                held += size_of::<Value>() * items.capacity();
-                open.extend(items);
-            }
-            Value::Object(members) => {
-                held += members
-                    .keys()
-                    .map(|key| ENTRY + key.capacity())
-                    .sum::<usize>();
-                open.extend(members.values());
-            }
-        }
-    }
-    held
-}
-
 impl Scan {
     /// The container it was read from; [`Scan::write`] writes the same.
     pub fn container(&self) -> Container {

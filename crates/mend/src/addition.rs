@@ -35,119 +35,115 @@ impl PatchSource<'_> {
     /// # Errors
     /// `Exhausted`.
     pub fn addition(&self, filled: &FilledHole) -> Result<PatchPrimitive, Exhausted> {
-        addition(self, filled)
-    }
-}
-
-fn addition(source: &PatchSource, filled: &FilledHole) -> Result<PatchPrimitive, Exhausted> {
-    let PatchSource {
-        scan,
-        welded,
-        card,
-        budget,
-    } = *source;
-    let FilledHole {
-        hole,
-        patch,
-        report,
-    } = filled;
-    let (region, chart) = (&hole.region, &hole.chart);
-    let faces = region.faces.iter();
-    let sources: Vec<Option<SourceFace>> = faces.map(|f| welded.source(scan, *f)).collect();
-    let part = majority(patch, region, &sources);
-    let look = &scan.parts[part];
-    let alike = |other: usize| {
-        let other: &ScanPart = &scan.parts[other];
-        other.material == look.material
-            && other.texcoords.len() == look.texcoords.len()
-            && other.colors.len() == look.colors.len()
-    };
-    let corners: Vec<Option<[u32; 3]>> = sources
-        .iter()
-        .map(|s| s.filter(|s| alike(s.part)).map(|s| s.corners))
-        .collect();
-    let mut any = vec![u32::MAX; region.mesh.positions.len()];
-    let mut owners: Vec<(u32, usize)> = Vec::new();
-    for (face, source) in region.mesh.faces.iter().zip(&sources) {
-        let Some(source) = source else {
-            continue;
+        let PatchSource {
+            scan,
+            welded,
+            card,
+            budget,
+        } = *self;
+        let FilledHole {
+            hole,
+            patch,
+            report,
+        } = filled;
+        let (region, chart) = (&hole.region, &hole.chart);
+        let faces = region.faces.iter();
+        let sources: Vec<Option<SourceFace>> = faces.map(|f| welded.source(scan, *f)).collect();
+        let part = majority(patch, region, &sources);
+        let look = &scan.parts[part];
+        let alike = |other: usize| {
+            let other: &ScanPart = &scan.parts[other];
+            other.material == look.material
+                && other.texcoords.len() == look.texcoords.len()
+                && other.colors.len() == look.colors.len()
         };
-        if alike(source.part) {
-            owners.extend(source.corners.map(|s| (s, source.part)));
-        }
-        for (v, s) in face.iter().zip(&source.corners) {
-            // A vertex of the patch's own node is preferred: its stored bits are copied.
-            let own = scan.parts[source.part].node == look.node;
-            if own || any[*v as usize] == u32::MAX {
-                any[*v as usize] = *s;
+        let corners: Vec<Option<[u32; 3]>> = sources
+            .iter()
+            .map(|s| s.filter(|s| alike(s.part)).map(|s| s.corners))
+            .collect();
+        let mut any = vec![u32::MAX; region.mesh.positions.len()];
+        let mut owners: Vec<(u32, usize)> = Vec::new();
+        for (face, source) in region.mesh.faces.iter().zip(&sources) {
+            let Some(source) = source else {
+                continue;
+            };
+            if alike(source.part) {
+                owners.extend(source.corners.map(|s| (s, source.part)));
+            }
+            for (v, s) in face.iter().zip(&source.corners) {
+                // A vertex of the patch's own node is preferred: its stored bits are copied.
+                let own = scan.parts[source.part].node == look.node;
+                if own || any[*v as usize] == u32::MAX {
+                    any[*v as usize] = *s;
+                }
             }
         }
-    }
-    // Parts may share vertices; the last part that uses a vertex gives its values.
-    owners.sort_by_key(|(s, _)| *s);
-    let values = |s: u32| {
-        let after = owners.partition_point(|(vertex, _)| *vertex <= s);
-        let owner = owners[..after].last().filter(|(vertex, _)| *vertex == s);
-        owner.map_or_else(Vec::new, |(_, p)| columns_of(&scan.parts[*p], s))
-    };
-    let width = 2 * look.texcoords.len() + 4 * look.colors.len();
-    let columns = Columns {
-        corners: &corners,
-        any: &any,
-        values: &values,
-        width,
-        budget,
-    };
-    let (dressed, normals) = rayon::join(
-        || extend_attributes(&hole.plan, patch, region, chart, &columns),
-        || normals(patch, region),
-    );
-    let dressed = dressed?;
-    budget.hold(patch_bytes(dressed.corners.len(), width))?;
-    let points = dressed.corners.iter().map(|c| match c.scan {
-        Some(s) => PatchPoint::Scan(s),
-        None => PatchPoint::New(patch.positions[c.vertex as usize]),
-    });
-    let column = |c: usize| {
-        dressed
-            .corners
-            .iter()
-            .map(move |corner| corner.values.get(c).copied().unwrap_or_default() as f32)
-    };
-    let texcoords = (0..look.texcoords.len()).map(|t| {
-        column(2 * t)
-            .zip(column(2 * t + 1))
-            .map(|(s, t)| [s, t])
-            .collect()
-    });
-    let first = 2 * look.texcoords.len();
-    let colors = (0..look.colors.len()).map(|c| {
-        let channel = |k: usize| {
-            column(first + 4 * c + k)
-                .map(|x| x.clamp(0.0, 1.0))
-                .collect::<Vec<f32>>()
+        // Parts may share vertices; the last part that uses a vertex gives its values.
+        owners.sort_by_key(|(s, _)| *s);
+        let values = |s: u32| {
+            let after = owners.partition_point(|(vertex, _)| *vertex <= s);
+            let owner = owners[..after].last().filter(|(vertex, _)| *vertex == s);
+            owner.map_or_else(Vec::new, |(_, p)| columns_of(&scan.parts[*p], s))
         };
-        let rgba = [channel(0), channel(1), channel(2), channel(3)];
-        (0..dressed.corners.len())
-            .map(|n| [0, 1, 2, 3].map(|k: usize| rgba[k][n]))
-            .collect()
-    });
-    Ok(PatchPrimitive {
-        part,
-        material_of: part,
-        points: points.collect(),
-        faces: dressed.faces,
-        both_sides: is_backed(region, welded),
-        normals: dressed
-            .corners
-            .iter()
-            .map(|c| normals[c.vertex as usize])
-            .collect(),
-        texcoords: texcoords.collect(),
-        colors: colors.collect(),
-        name: format!("darn reconstruction of hole {}", report.id),
-        extras: provenance(report, card),
-    })
+        let width = 2 * look.texcoords.len() + 4 * look.colors.len();
+        let columns = Columns {
+            corners: &corners,
+            any: &any,
+            values: &values,
+            width,
+            budget,
+        };
+        let (dressed, normals) = rayon::join(
+            || extend_attributes(&hole.plan, patch, region, chart, &columns),
+            || normals(patch, region),
+        );
+        let dressed = dressed?;
+        budget.hold(patch_bytes(dressed.corners.len(), width))?;
+        let points = dressed.corners.iter().map(|c| match c.scan {
+            Some(s) => PatchPoint::Scan(s),
+            None => PatchPoint::New(patch.positions[c.vertex as usize]),
+        });
+        let column = |c: usize| {
+            dressed
+                .corners
+                .iter()
+                .map(move |corner| corner.values.get(c).copied().unwrap_or_default() as f32)
+        };
+        let texcoords = (0..look.texcoords.len()).map(|t| {
+            column(2 * t)
+                .zip(column(2 * t + 1))
+                .map(|(s, t)| [s, t])
+                .collect()
+        });
+        let first = 2 * look.texcoords.len();
+        let colors = (0..look.colors.len()).map(|c| {
+            let channel = |k: usize| {
+                column(first + 4 * c + k)
+                    .map(|x| x.clamp(0.0, 1.0))
+                    .collect::<Vec<f32>>()
+            };
+            let rgba = [channel(0), channel(1), channel(2), channel(3)];
+            (0..dressed.corners.len())
+                .map(|n| [0, 1, 2, 3].map(|k: usize| rgba[k][n]))
+                .collect()
+        });
+        Ok(PatchPrimitive {
+            part,
+            material_of: part,
+            points: points.collect(),
+            faces: dressed.faces,
+            both_sides: is_backed(region, welded),
+            normals: dressed
+                .corners
+                .iter()
+                .map(|c| normals[c.vertex as usize])
+                .collect(),
+            texcoords: texcoords.collect(),
+            colors: colors.collect(),
+            name: format!("darn reconstruction of hole {}", report.id),
+            extras: provenance(report, card),
+        })
+    }
 }
 
 /// Bytes of memory of a patch: as columns, as a primitive, and in the answer.

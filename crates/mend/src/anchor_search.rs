@@ -45,7 +45,7 @@ impl<'a> AnchorLosses<'a> {
             moved_in: (target - near).norm(),
             problem: inpainter.anchor_problem(&hole.normal_grid(), target_at)?,
             inpainter,
-            budget: context.budget,
+            budget: context.call.budget,
         })
     }
 }
@@ -107,7 +107,7 @@ impl HoleContext<'_> {
         };
         let first = first.ok_or_else(|| self.no_cells())?;
         let outcome = if search.exhaustive {
-            let outcome = search_every_cell(&losses, &hole.cells, &self.limits.search)?;
+            let outcome = search_every_cell(&losses, &hole.cells, &self.call.mender.limits.search)?;
             outcome.ok_or_else(|| self.no_cells())?
         } else {
             self.descend(&losses, first)?
@@ -127,8 +127,8 @@ impl HoleContext<'_> {
 
     fn descend(&self, losses: &AnchorLosses, first: usize) -> Result<SearchOutcome, MendError> {
         let cells = &self.hole.cells;
-        let seeds = seeds(cells, first, self.limits.seeds);
-        let outcome = descend(losses, cells, &seeds, &self.limits.search)?;
+        let seeds = seeds(cells, first, self.call.mender.limits.seeds);
+        let outcome = descend(losses, cells, &seeds, &self.call.mender.limits.search)?;
         outcome.ok_or_else(|| self.no_cells())
     }
 
@@ -168,7 +168,7 @@ impl HoleContext<'_> {
     ) -> Result<(), MendError> {
         let indices = self.hole.cells.indices();
         let mut at_cells: Vec<Option<CellLoss>> = vec![None; CELLS];
-        for cells in indices.chunks(self.limits.search.batch.max(1)) {
+        for cells in indices.chunks(self.call.mender.limits.search.batch.max(1)) {
             for (cell, at) in cells.iter().zip(losses.gradients(cells)?) {
                 at_cells[*cell] = Some(at);
             }

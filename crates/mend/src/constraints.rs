@@ -63,7 +63,7 @@ impl<'a> HoleContext<'a> {
         };
         let mut anchors = Vec::new();
         for Entry { value: anchor, .. } in &request.anchors {
-            self.budget.spend(place_work)?;
+            self.call.budget.spend(place_work)?;
             let target = Vec3::from(anchor.position);
             let uv = match anchor.uv {
                 Some(uv) => uv.into(),
@@ -76,19 +76,19 @@ impl<'a> HoleContext<'a> {
             anchors.push(surface.point(uv, target, firmness));
         }
         let mut asked = targets(&anchors);
-        self.budget.spend(REACH_WORK * anchors.len() as u64)?;
+        self.call.budget.spend(REACH_WORK * anchors.len() as u64)?;
         bring_within_reach(hole, &mut anchors);
         let mut placed = PlacedPoints::new(&hole.cells, surface, anchors);
         let mut edits: Vec<Vec<usize>> = Vec::with_capacity(request.edits.len());
         for edit in &request.edits {
-            self.budget.spend(GESTURE_WORK + place_work)?;
+            self.call.budget.spend(GESTURE_WORK + place_work)?;
             edits.push(placed.apply(&edit.value.gesture));
         }
         let mut points = placed.points().to_vec();
         asked.extend(targets(&points).into_iter().skip(asked.len()));
         check_count(hole, points.len())?;
         if !edits.is_empty() {
-            self.budget.spend(REACH_WORK * points.len() as u64)?;
+            self.call.budget.spend(REACH_WORK * points.len() as u64)?;
             bring_within_reach(hole, &mut points);
         }
         let constraints = HoleConstraints {
@@ -269,7 +269,8 @@ mod tests {
     use darn_budget::Budget;
 
     use super::*;
-    use crate::testing::{BEST_UV, context, request};
+    use crate::mender::Call;
+    use crate::testing::{BEST_UV, context, mender, request};
     use proptest::prelude::*;
 
     const MIDDLE: [f64; 2] = [0.5, 0.5];
@@ -331,10 +332,11 @@ mod tests {
     #[test]
     fn anchors_without_uv_ask_the_budget() {
         let left = Budget::new(darn_budget::Limits::default(), &|| true);
-        let context = HoleContext {
+        let call = Call {
+            mender: mender(),
             budget: &left,
-            ..context()
         };
+        let context = HoleContext { call, ..context() };
         let free = Anchor {
             uv: None,
             ..soft(&context, MIDDLE, Vec3::zeros())

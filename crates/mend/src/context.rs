@@ -3,12 +3,9 @@
 
 use std::sync::Arc;
 
-use darn_budget::Budget;
-
 use crate::error::MendError;
 use crate::hole::{Hole, UneditedCloth};
 use crate::inpainter::Inpainter;
-use crate::limits::MendLimits;
 use crate::mender::Call;
 
 /// A hole, its cloth without constraints, and what fills it.
@@ -19,10 +16,8 @@ pub struct HoleContext<'a> {
     pub unedited: Arc<UneditedCloth>,
     /// The network.
     pub inpainter: Inpainter<'a>,
-    /// The limits and options.
-    pub limits: &'a MendLimits,
-    /// What filling it may cost.
-    pub budget: &'a Budget<'a>,
+    /// The limits and options, and what filling it may cost.
+    pub call: Call<'a>,
 }
 
 impl<'a> HoleContext<'a> {
@@ -39,8 +34,7 @@ impl<'a> HoleContext<'a> {
             hole,
             unedited: hole.unedited(inpainter, call)?,
             inpainter: inpainter.clone(),
-            limits: &call.mender.limits,
-            budget: call.budget,
+            call,
         })
     }
 }

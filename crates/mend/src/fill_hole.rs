@@ -67,10 +67,7 @@ impl<'a> HoleContext<'a> {
         let stretch = |patch: &Patch| quality::measure(patch, &hole.region).stretch_max;
         let usual = stretch(&unedited.patch);
         let most = stretch_limit(usual);
-        let work = PatchWork {
-            options: &self.limits.patch,
-            budget: self.budget,
-        };
+        let work = PatchWork::from(self.call);
         let mut share = 1.0;
         for _ in 0..MAX_TRIES {
             let each = unedited.filled.iter().zip(moved);

@@ -25,6 +25,7 @@ mod inpainter;
 mod limits;
 mod mender;
 mod moved_fill;
+mod nearest_hole;
 mod picture;
 mod port;
 mod prepare;
@@ -165,19 +166,25 @@ mod tests {
         jitter(&sheet(n, keep, |u, v| Vec3::new(u, v, 0.0)), 100.0, 1)
     }
 
-    /// Work in nanoseconds until the scan is mended or refused.
-    fn work(scan: &Scan, limit: u64) -> (u64, Option<MendError>) {
-        let limits = Limits {
-            work: limit,
-            ..Limits::default()
-        };
+    /// Why a scan is not mended within limits, if it is not; and the work that was counted, nanoseconds.
+    fn mended_within(scan: &Scan, limits: Limits) -> (Option<MendError>, u64) {
         let budget = Budget::new(limits, &|| false);
         let call = Call {
             mender: mender(),
             budget: &budget,
         };
         let error = mend(scan, &Constraints::default(), call).err();
-        (budget.spent(), error)
+        (error, budget.spent())
+    }
+
+    /// The work of a scan, nanoseconds.
+    fn work(scan: &Scan, limit: u64) -> (u64, Option<MendError>) {
+        let limits = Limits {
+            work: limit,
+            ..Limits::default()
+        };
+        let (error, spent) = mended_within(scan, limits);
+        (spent, error)
     }
 
     #[test]
@@ -217,12 +224,7 @@ mod tests {
             deadline: Some(Instant::now() + std::time::Duration::from_millis(1)),
             ..Limits::default()
         };
-        let budget = Budget::new(limits, &|| false);
-        let call = Call {
-            mender: mender(),
-            budget: &budget,
-        };
-        let error = mend(&scan, &Constraints::default(), call).unwrap_err();
+        let error = mended_within(&scan, limits).0.expect("a refusal");
         assert_eq!(error.code(), darn_contract::codes::DEADLINE_EXCEEDED);
     }
 
@@ -237,12 +239,7 @@ mod tests {
             memory: 4 << 20,
             ..Limits::default()
         };
-        let budget = Budget::new(limits, &|| false);
-        let call = Call {
-            mender: mender(),
-            budget: &budget,
-        };
-        let error = mend(&scan, &Constraints::default(), call).unwrap_err();
+        let error = mended_within(&scan, limits).0.expect("a refusal");
         assert_eq!(
             error.code(),
             darn_contract::codes::TOO_MUCH_MEMORY,

@@ -35,8 +35,8 @@ impl HoleContext<'_> {
             }
             grid
         };
-        self.budget.spend(FILL_WORK)?;
-        let predicted = match self.limits.edited_fill {
+        self.call.budget.spend(FILL_WORK)?;
+        let predicted = match self.call.mender.limits.edited_fill {
             EditedFill::Plain => {
                 let answers = self.inpainter.fill(&[given(1.0)], Averaging::Flips)?;
                 hole.in_scene(answers.first().map_or(&[], Vec::as_slice))

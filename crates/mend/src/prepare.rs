@@ -6,7 +6,6 @@ use std::time::Instant;
 use crate::edit::{HoleCells, ReachLimit, RimPoint};
 use crate::error::MendError;
 use crate::hole::{Hole, UneditedCloths};
-use crate::limits::MendLimits;
 use crate::mender::Call;
 use crate::timings::milliseconds;
 use crate::welded_scan::WeldedScan;
@@ -19,7 +18,7 @@ use darn_geometry::mesh::index::LoopId;
 use darn_geometry::mesh::layers::layers_near;
 use darn_geometry::mesh::region::{self, BoundedMesh, Region, RegionError};
 use darn_geometry::mesh::{TriMesh, Vec2};
-use darn_geometry::patch::{self, PatchError, PatchWork};
+use darn_geometry::patch::{self, PatchError};
 use darn_geometry::polygon::{extent, inside};
 
 /// Share of the grid's side that the hole should take, so that hole and context share the grid as in training.
@@ -49,9 +48,8 @@ pub fn prepare_hole(welded: &WeldedScan, id: u32, call: Call) -> Result<Hole, Me
         let preparation = Preparation {
             welded,
             id,
-            limits: &call.mender.limits,
             denoise,
-            budget: call.budget,
+            call,
         };
         preparation.hole(reach)
     })?;
@@ -85,9 +83,8 @@ fn without_noise<T>(
 struct Preparation<'a> {
     welded: &'a WeldedScan,
     id: u32,
-    limits: &'a MendLimits,
     denoise: Denoise<'a>,
-    budget: &'a Budget<'a>,
+    call: Call<'a>,
 }
 
 /// The cloth around a hole, laid flat.
@@ -147,7 +144,7 @@ impl Preparation<'_> {
         let hole = self.id;
         let started = Instant::now();
         let region =
-            grown(self.welded, hole, reach, self.budget).map_err(MendError::region(hole))?;
+            grown(self.welded, hole, reach, self.call.budget).map_err(MendError::region(hole))?;
         let grown_ms = milliseconds(started);
         let started = Instant::now();
         let smooth = (self.denoise)(&region.mesh)?.map(|mesh| Region {
@@ -155,7 +152,7 @@ impl Preparation<'_> {
             ..region.clone()
         });
         let seen = smooth.as_ref().unwrap_or(&region);
-        let chart = flatten::flatten(seen, &self.limits.flatten, self.budget)
+        let chart = flatten::flatten(seen, &self.call.mender.limits.flatten, self.call.budget)
             .map_err(MendError::flatten(hole))?;
         let timings = v1::HoleTimings {
             region: grown_ms,
@@ -172,12 +169,12 @@ impl Preparation<'_> {
 
     /// Samples the grid and plans the patch.
     fn sampled(&self, flat: FlatRegion) -> Result<Hole, MendError> {
-        let (id, welded, budget) = (self.id, self.welded, self.budget);
+        let (id, welded, call) = (self.id, self.welded, self.call);
         let seen = flat.smooth.as_ref().unwrap_or(&flat.region);
         let rim_uv = flat.rim_uv();
         let sample = || {
             let started = Instant::now();
-            budget.spend(GRID_WORK)?;
+            call.budget.spend(GRID_WORK)?;
             let grid = flatten::raster(&seen.mesh, &flat.chart);
             let normal = grid.normalisation().ok_or(MendError::TooLittleKnown {
                 hole: id,
@@ -198,13 +195,9 @@ impl Preparation<'_> {
             let mesh = &welded.surface.mesh;
             // The largest distance that cloth of the hole's extent can have from its rim.
             let beyond = 0.5 * extent(&rim_uv) * flat.chart.frame.side;
-            budget.spend(LAYERS_WORK * mesh.faces.len() as u64)?;
+            call.budget.spend(LAYERS_WORK * mesh.faces.len() as u64)?;
             let others = layers_near(mesh, &flat.region, beyond);
-            let work = PatchWork {
-                options: &self.limits.patch,
-                budget,
-            };
-            let plan = patch::plan_in(mesh, seen, &flat.chart, work)
+            let plan = patch::plan_in(mesh, seen, &flat.chart, call)
                 .and_then(|plan| match &flat.smooth {
                     Some(_) => plan.with_region_at(&flat.region.mesh.positions),
                     None => Ok(plan),

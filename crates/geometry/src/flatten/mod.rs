@@ -142,25 +142,15 @@ mod tests {
 
     use super::*;
     use crate::mesh::Vec3;
-    use crate::mesh::loops::{LoopKind, boundary_loops};
-    use crate::mesh::region::{BoundedMesh, grow};
+    use crate::mesh::region::region_around_hole;
     use crate::mesh::shapes::{jitter, sheet};
     use crate::mesh::weld::weld;
 
     /// The region around the hole of a sheet laid out by `place`.
     fn region(n: usize, noise: f64, seed: u64, place: impl Fn(f64, f64) -> Vec3) -> Region {
         let keep = |u: f64, v: f64| (u - 0.5).hypot(v - 0.5) > 0.2;
-        let welded = weld(&jitter(&sheet(n, keep, place), noise / n as f64, seed));
-        let topology = welded.topology();
-        let loops = boundary_loops(&welded.mesh, &topology);
-        let hole = loops.iter().find(|l| l.kind == LoopKind::Hole);
-        let hole = hole.expect("a hole").id;
-        let cloth = BoundedMesh {
-            mesh: &welded.mesh,
-            topology: &topology,
-            loops: &loops,
-        };
-        grow(&cloth, hole, 0.25, Budget::unlimited()).expect("a region")
+        let mesh = weld(&jitter(&sheet(n, keep, place), noise / n as f64, seed)).mesh;
+        region_around_hole(&mesh, 0.25)
     }
 
     fn rolled(bend: f64) -> impl Fn(f64, f64) -> Vec3 {

@@ -32,12 +32,9 @@ pub fn layers_near(whole: &TriMesh, region: &Region, margin: f64) -> TriMesh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::loops::{LoopKind, boundary_loops};
-    use crate::mesh::region;
+    use crate::mesh::region::region_around_hole;
     use crate::mesh::shapes::{concat, sheet};
-    use crate::mesh::topology::Topology;
     use crate::mesh::weld::weld;
-    use darn_budget::Budget;
 
     #[test]
     fn a_second_layer_is_near_and_the_rest_of_the_sheet_is_far() {
@@ -45,20 +42,7 @@ mod tests {
         let holed = sheet(30, keep, |u, v| Vec3::new(u, v, 0.0));
         let layer = sheet(30, |_, _| true, |u, v| Vec3::new(u, v, 0.05));
         let mesh = weld(&concat(&holed, &layer)).mesh;
-        let topology = Topology::new(&mesh);
-        let loops = boundary_loops(&mesh, &topology);
-        let hole = loops.iter().find(|l| l.kind == LoopKind::Hole).unwrap();
-        let region = region::grow(
-            &region::BoundedMesh {
-                mesh: &mesh,
-                topology: &topology,
-                loops: &loops,
-            },
-            hole.id,
-            0.2,
-            Budget::unlimited(),
-        )
-        .unwrap();
+        let region = region_around_hole(&mesh, 0.2);
         assert!(region.faces.len() < holed.faces.len());
 
         let near = layers_near(&mesh, &region, 0.06);

@@ -125,7 +125,8 @@ pub fn grow(
     let mut reach = reach.min(farthest);
     loop {
         reach = reach.max(narrowest);
-        let shape = match cut_out(&growth, reach, budget)? {
+        let inside = growth.inside(reach, budget)?;
+        let shape = match cut_out(&growth, &inside, reach) {
             Ok(region) => {
                 small_enough(mesh, asked, &region.vertices)?;
                 return Ok(region);
@@ -169,22 +170,8 @@ struct Shape {
     outer: usize,
 }
 
-/// The faces within a reach as a mesh of its own, if it is a disk once its holes are closed.
-///
-/// # Errors
-/// `Exhausted`.
-fn cut_out(
-    growth: &Growth,
-    reach: f64,
-    budget: &Budget,
-) -> Result<Result<Region, Shape>, Exhausted> {
-    let inside = growth.inside(reach, budget)?;
-    budget.check()?;
-    Ok(cut_out_faces(growth, &inside, reach))
-}
-
 /// The faces `inside` as a mesh of its own, if it is a disk once its holes are closed.
-fn cut_out_faces(growth: &Growth, inside: &[bool], reach: f64) -> Result<Region, Shape> {
+fn cut_out(growth: &Growth, inside: &[bool], reach: f64) -> Result<Region, Shape> {
     let BoundedMesh { mesh, topology, .. } = growth.whole;
     let faces: Vec<FaceId> = (0..inside.len() as u32)
         .map(FaceId)
@@ -260,6 +247,21 @@ fn cut_out_faces(growth: &Growth, inside: &[bool], reach: f64) -> Result<Region,
         outer,
         reach,
     })
+}
+
+/// The region of this reach around the first hole of a welded mesh, for tests.
+#[cfg(test)]
+pub(crate) fn region_around_hole(mesh: &TriMesh, reach: f64) -> Region {
+    let topology = Topology::new(mesh);
+    let loops = super::loops::boundary_loops(mesh, &topology);
+    let hole = loops.iter().find(|l| l.kind == LoopKind::Hole);
+    let whole = BoundedMesh {
+        mesh,
+        topology: &topology,
+        loops: &loops,
+    };
+    let rim = hole.expect("the mesh has a hole").id;
+    grow(&whole, rim, reach, Budget::unlimited()).expect("a region")
 }
 
 #[cfg(test)]

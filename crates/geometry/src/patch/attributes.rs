@@ -407,10 +407,10 @@ mod tests {
     use super::*;
     use crate::flatten::{FlattenLimits, flatten};
     use crate::mesh::index::FaceId;
-    use crate::mesh::loops::{LoopKind, boundary_loops};
+    use crate::mesh::region::region_around_hole;
     use crate::mesh::shapes::{concat, explode, sheet};
     use crate::mesh::weld::weld;
-    use crate::mesh::{TriMesh, Vec3, region};
+    use crate::mesh::{TriMesh, Vec3};
     use crate::patch::{PatchOptions, plan};
 
     /// A wavy sheet with a round hole, and its texture, which is mirrored right of the middle, on separate vertices.
@@ -427,20 +427,7 @@ mod tests {
     /// The attributed patch of a mesh's hole; `texture` holds the columns of its vertices.
     fn attributed(soup: &TriMesh, texture: &[Vec<f64>]) -> AttributedPatch {
         let welded = weld(soup);
-        let topology = welded.topology();
-        let loops = boundary_loops(&welded.mesh, &topology);
-        let hole = loops.iter().find(|l| l.kind == LoopKind::Hole).unwrap();
-        let region = region::grow(
-            &region::BoundedMesh {
-                mesh: &welded.mesh,
-                topology: &topology,
-                loops: &loops,
-            },
-            hole.id,
-            f64::INFINITY,
-            Budget::unlimited(),
-        )
-        .unwrap();
+        let region = region_around_hole(&welded.mesh, f64::INFINITY);
         let chart = flatten(&region, &FlattenLimits::default(), Budget::unlimited()).unwrap();
         let (options, filled) = (
             PatchOptions::default(),

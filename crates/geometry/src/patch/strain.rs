@@ -95,6 +95,20 @@ mod tests {
         (rest, faces, (n - 1) * (n - 1))
     }
 
+    /// Limits the strain of a mesh whose target is where it lies.
+    fn minimise(rest: &RestMesh, positions: &mut [Vec3], options: StrainOptions) {
+        let energy = StrainEnergy::new(rest, &options, Budget::unlimited()).unwrap();
+        let target = energy.target_near(positions, &options);
+        let minimisation = Minimisation {
+            energy: &energy,
+            target: &target,
+            forces: None,
+            options,
+            budget: Budget::unlimited(),
+        };
+        minimisation.run(positions).unwrap();
+    }
+
     #[test]
     fn a_sagging_sheet_returns_to_its_lengths() {
         let (rest, faces, free) = lattice(8);
@@ -113,17 +127,7 @@ mod tests {
             faces: &faces,
             free,
         };
-        let energy = StrainEnergy::new(&rest_mesh, &options, Budget::unlimited()).unwrap();
-        let target = energy.target_near(&positions, &options);
-        Minimisation {
-            energy: &energy,
-            target: &target,
-            forces: None,
-            options,
-            budget: Budget::unlimited(),
-        }
-        .run(&mut positions)
-        .unwrap();
+        minimise(&rest_mesh, &mut positions, options);
         for face in &faces {
             for k in 0..3 {
                 let (a, b) = (face[k] as usize, face[(k + 1) % 3] as usize);
@@ -138,23 +142,13 @@ mod tests {
         let (rest, faces, free) = lattice(6);
         let mut positions: Vec<Vec3> = rest.iter().map(|p| Vec3::new(p.x, 2.0, p.y)).collect();
         let before = positions.clone();
+        let options = StrainOptions::default();
         let rest_mesh = RestMesh {
             points: &rest,
             faces: &faces,
             free,
         };
-        let options = StrainOptions::default();
-        let energy = StrainEnergy::new(&rest_mesh, &options, Budget::unlimited()).unwrap();
-        let target = energy.target_near(&positions, &options);
-        Minimisation {
-            energy: &energy,
-            target: &target,
-            forces: None,
-            options,
-            budget: Budget::unlimited(),
-        }
-        .run(&mut positions)
-        .unwrap();
+        minimise(&rest_mesh, &mut positions, options);
         for (p, q) in positions.iter().zip(&before) {
             assert!((p - q).norm() < 1e-9);
         }

@@ -3,8 +3,8 @@
 use super::*;
 use crate::flatten::{FlattenLimits, UvSquare, flatten};
 use crate::mesh::intersect::intersections_with;
-use crate::mesh::loops::{LoopKind, boundary_loops};
-use crate::mesh::region;
+use crate::mesh::loops::boundary_loops;
+use crate::mesh::region::region_around_hole;
 use crate::mesh::shapes::{jitter, sheet};
 use crate::mesh::topology::Topology;
 use crate::mesh::weld::weld;
@@ -16,20 +16,7 @@ fn wavy(slack: f64) -> (Region, Chart, Vec<Vec3>) {
     let keep = |u: f64, v: f64| (u - 0.5).hypot(v - 0.5) > 0.2;
     let wave = |u: f64, v: f64| Vec3::new(u, v, 0.06 * (10.0 * u).sin());
     let mesh = weld(&sheet(36, keep, wave)).mesh;
-    let topology = Topology::new(&mesh);
-    let loops = boundary_loops(&mesh, &topology);
-    let hole = loops.iter().find(|l| l.kind == LoopKind::Hole).unwrap();
-    let region = region::grow(
-        &region::BoundedMesh {
-            mesh: &mesh,
-            topology: &topology,
-            loops: &loops,
-        },
-        hole.id,
-        f64::INFINITY,
-        Budget::unlimited(),
-    )
-    .unwrap();
+    let region = region_around_hole(&mesh, f64::INFINITY);
     let mut chart = flatten(&region, &FlattenLimits::default(), Budget::unlimited()).unwrap();
     chart.flat.iter_mut().for_each(|p| *p *= slack);
     chart.frame = UvSquare::tightest(&chart.flat);
@@ -229,20 +216,7 @@ fn a_rim_that_touches_itself_is_closed_on_the_scan() {
     };
     let wave = |u: f64, v: f64| Vec3::new(u, v, 0.05 * (9.0 * u).sin() * (5.0 * v).cos());
     let scan = weld(&sheet(18, |u, v| !in_hole(u, v), wave)).mesh;
-    let topology = Topology::new(&scan);
-    let loops = boundary_loops(&scan, &topology);
-    let hole = loops.iter().find(|l| l.kind == LoopKind::Hole).unwrap();
-    let region = region::grow(
-        &region::BoundedMesh {
-            mesh: &scan,
-            topology: &topology,
-            loops: &loops,
-        },
-        hole.id,
-        f64::INFINITY,
-        Budget::unlimited(),
-    )
-    .unwrap();
+    let region = region_around_hole(&scan, f64::INFINITY);
     let mut seen = region.clone();
     let apart = (seen.mesh.positions.iter_mut()).enumerate();
     apart.for_each(|(v, p)| p.z += 1e-3 * (v as f64).sin());
