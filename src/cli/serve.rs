@@ -25,7 +25,7 @@ pub fn run(settings: &ServeCommand) -> Result<(), Failure> {
     (rayon::ThreadPoolBuilder::new()
         .num_threads(settings.threads.unwrap_or(0))
         .build_global())
-    .or_fail("start the threads that workers share (DARN_THREADS)")?;
+    .or_fail("start the threads of mends (DARN_THREADS)")?;
     allocator::give_back_when_idle();
     let mender = NetworkMender {
         scan_limits: settings.scan_limits(),

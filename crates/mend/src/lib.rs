@@ -248,6 +248,18 @@ mod tests {
     }
 
     #[test]
+    fn an_answer_beyond_the_limit_is_refused() {
+        let keep = |u: f64, v: f64| (u - 0.5).hypot(v - 0.5) > 0.2;
+        let scan = scan_of(&sheet(12, keep, |u, v| Vec3::new(u, v, 0.0)));
+        let limits = Limits {
+            output: 1000,
+            ..Limits::default()
+        };
+        let error = mended_within(&scan, limits).0.expect("a refusal");
+        assert_eq!(error.code(), darn_contract::codes::ANSWER_TOO_LARGE);
+    }
+
+    #[test]
     fn a_report_repeats_no_long_name_for_every_loop() {
         let mesh = sheet(
             12,

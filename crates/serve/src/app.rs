@@ -197,7 +197,7 @@ impl App {
             client: None,
             bytes: 0,
         };
-        // Without the budget, whose limits are no concern of the example's.
+        // The warm-up takes no budget, so its size limits nothing.
         self.run_job(None, size, deadline, |mender, _| mender.warm_up())
             .await?;
         self.warm.store(true, Relaxed);
@@ -236,8 +236,7 @@ impl App {
         })?;
         let client = client.filter(|_| self.sharing == Sharing::ByAddress);
         (self.pool.check_capacity(client)).map_err(|error| of_pool(error, self.limits.deadline))?;
-        let upload = UploadPermit { client, slot };
-        Ok(upload)
+        Ok(UploadPermit { client, slot })
     }
 
     /// Runs a job on a scan of this many bytes on a worker, within the deadline and the work and memory that such a scan may cost.
@@ -286,10 +285,12 @@ impl App {
 
     /// What a job on a scan of this many bytes may cost.
     fn job_limits(&self, bytes: usize) -> Limits {
-        let per_byte = (WORK_PER_BYTE * bytes as u64).max(self.limits.work.as_nanos() as u64);
+        let memory = (MEMORY_PER_BYTE * bytes).max(LEAST_MEMORY);
         Limits {
-            work: per_byte,
-            memory: (MEMORY_PER_BYTE * bytes).max(LEAST_MEMORY),
+            work: (WORK_PER_BYTE * bytes as u64).max(self.limits.work.as_nanos() as u64),
+            memory,
+            // An answer is in memory as a whole.
+            output: memory,
             pool: Some(Arc::clone(&self.limits.memory)),
             ..Limits::default()
         }

@@ -18,7 +18,7 @@ use super::{
     pace::{PaceLimits, TooSlow},
     parameters::{self, Parameters},
 };
-use darn_contract::{Constraints, FieldError};
+use darn_contract::{Constraints, FieldError, cut};
 
 /// Most bytes of an unwanted body that are read and dropped, as a multiple of the body limit.
 const DRAIN_FACTOR: u64 = 4;
@@ -282,7 +282,9 @@ fn check_encoding(headers: &HeaderMap) -> Result<(), RequestError> {
             !coding.is_empty() && !coding.eq_ignore_ascii_case("identity")
         };
         if got.split(',').any(is_unknown) {
-            return Err(RequestError::ContentEncoding { got: cut(got, 100) });
+            return Err(RequestError::ContentEncoding {
+                got: cut(got, 100).into_owned(),
+            });
         }
     }
     Ok(())
@@ -371,9 +373,4 @@ async fn split_form<P: Parameters>(
     }
     let parameters = parameters.map(|text| P::parse(&text)).transpose()?;
     Ok((scan.ok_or(RequestError::EmptyBody)?, parameters))
-}
-
-/// The first `limit` characters of a text.
-fn cut(text: &str, limit: usize) -> String {
-    text.chars().take(limit).collect()
 }

@@ -21,8 +21,9 @@ pub(crate) struct FairQueue<T> {
     time: u64,
     /// How many jobs have come.
     come: u64,
-    /// Most large jobs that run at once, in all and of one client.
+    /// Most large jobs that run at once.
     large_limit: usize,
+    /// Most of them that are of one client.
     large_limit_of_client: usize,
     /// Large jobs that run.
     large_running: usize,
@@ -37,7 +38,7 @@ struct Waiting<T> {
     /// Among equal tags the first job starts first.
     number: u64,
     client: Client,
-    size: JobClass,
+    class: JobClass,
     job: T,
 }
 
@@ -52,7 +53,7 @@ pub(crate) enum JobClass {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Started {
     client: Client,
-    size: JobClass,
+    class: JobClass,
 }
 
 /// The jobs of a client.
@@ -97,7 +98,7 @@ impl<T> FairQueue<T> {
             tag: self.time.saturating_add(cost.saturating_mul(jobs)),
             number: self.come,
             client,
-            size: if cost < LARGE {
+            class: if cost < LARGE {
                 JobClass::Small
             } else {
                 JobClass::Large
@@ -115,7 +116,7 @@ impl<T> FairQueue<T> {
                 .map_or(0, |load: &Load| load.large_running)
         };
         let may_start = |job: &Waiting<T>| {
-            job.size == JobClass::Small
+            job.class == JobClass::Small
                 || (self.large_running < self.large_limit
                     && large_of(&job.client) < self.large_limit_of_client)
         };
@@ -126,25 +127,25 @@ impl<T> FairQueue<T> {
         let Waiting {
             tag,
             client,
-            size,
+            class,
             job,
             ..
         } = self.waiting.swap_remove(next);
         self.time = self.time.max(tag);
-        let large = usize::from(size == JobClass::Large);
+        let large = usize::from(class == JobClass::Large);
         self.large_running += large;
         if let Some(load) = self.loads.get_mut(&client) {
             load.waiting -= 1;
             load.running += 1;
             load.large_running += large;
         }
-        Some((Started { client, size }, job))
+        Some((Started { client, class }, job))
     }
 
     /// A job has ended.
     pub(crate) fn ended(&mut self, started: Started) {
-        let Started { client, size } = started;
-        let large = usize::from(size == JobClass::Large);
+        let Started { client, class } = started;
+        let large = usize::from(class == JobClass::Large);
         self.large_running -= large;
         if let Some(load) = self.loads.get_mut(&client) {
             load.running -= 1;
