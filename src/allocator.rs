@@ -16,14 +16,16 @@ const SIZES: [usize; 3] = [64 << 10, 512 << 10, 4 << 20];
 /// In each of these rounds a part of the arenas is looked at.
 const ROUNDS: usize = 4;
 
-/// Has freed memory given back to the system while the process is idle. mimalloc gives pages back when some thread frees a page later, and in an
-/// idle service no thread does: after a large scan it would keep its memory until the next one.
+/// Has memory given back to the system while the process is idle: what `release` frees, given how long it must have been unused, and what was
+/// freed before. mimalloc gives pages back when some thread frees a page later, and in an idle service no thread does: after a large scan it would
+/// keep its memory until the next one.
 ///
 /// Without a thread for it, memory is given back with the next requests.
-pub fn give_back_when_idle() {
-    let give_back = || {
+pub fn give_back_when_idle(release: impl Fn(Duration) + Send + 'static) {
+    let give_back = move || {
         loop {
             thread::sleep(PAUSE);
+            release(PAUSE);
             for size in [SIZES; ROUNDS].into_iter().flatten() {
                 drop(black_box(Vec::<u8>::with_capacity(size)));
             }

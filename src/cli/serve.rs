@@ -26,10 +26,11 @@ pub fn run(settings: &ServeCommand) -> Result<(), Failure> {
         .num_threads(settings.threads.unwrap_or(0))
         .build_global())
     .or_fail("start the threads of mends (DARN_THREADS)")?;
-    allocator::give_back_when_idle();
-    let mender = NetworkMender {
+    let mender = Arc::new(NetworkMender {
         scan_limits: settings.scan_limits(),
         ..network::mender(&settings.network)?
-    };
-    darn_serve::run(serve, Arc::new(SharedMender(Arc::new(mender)))).or_fail("serve")
+    });
+    let networks = Arc::clone(&mender);
+    allocator::give_back_when_idle(move |unused| networks.networks.release_idle(unused));
+    darn_serve::run(serve, Arc::new(SharedMender(mender))).or_fail("serve")
 }

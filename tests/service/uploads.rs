@@ -22,6 +22,15 @@ async fn stalled(service: &Service, body: usize) -> TcpStream {
     stall(TcpStream::connect(service.address).await.unwrap(), body).await
 }
 
+/// So many of them.
+async fn some_stalled(service: &Service, body: usize, count: usize) -> Vec<TcpStream> {
+    let mut streams = Vec::new();
+    for _ in 0..count {
+        streams.push(stalled(service, body).await);
+    }
+    streams
+}
+
 /// The same on a connection.
 async fn stall(mut stream: TcpStream, body: usize) -> TcpStream {
     let head = format!(
@@ -110,10 +119,7 @@ async fn a_body_declared_too_large_is_refused_at_once() {
 #[tokio::test]
 async fn stalled_uploads_take_no_place_in_the_queue() {
     let service = Service::start(&["--workers", "1", "--queue", "1"]).await;
-    let mut streams = Vec::new();
-    for _ in 0..3 {
-        streams.push(stalled(&service, 9).await);
-    }
+    let mut streams = some_stalled(&service, 9, 3).await;
     // A test cannot observe that the service has begun to read them.
     tokio::time::sleep(Duration::from_millis(200)).await;
     assert_eq!(service.scan("cloth").send().await.unwrap().status(), 200);
@@ -125,14 +131,14 @@ async fn stalled_uploads_take_no_place_in_the_queue() {
 async fn uploads_are_bounded_and_the_refusal_names_the_setting() {
     let shared = ["--uploads", "3"];
     let anybody = ["--uploads", "2", "--connections-per-address", "0"];
-    for (settings, size, name) in [
-        (&anybody[..], LARGE, "uploads_full"),
-        (&anybody[..], 9, "uploads_full"),
-        (&shared[..], LARGE, "upload_share_full"),
-        (&shared[..], 9, "upload_share_full"),
+    for (settings, size, most, name) in [
+        (&anybody[..], LARGE, 2, "uploads_full"),
+        (&anybody[..], 9, 16, "small_uploads_full"),
+        (&shared[..], LARGE, 2, "upload_share_full"),
+        (&shared[..], 9, 12, "small_upload_share_full"),
     ] {
         let service = Service::start(settings).await;
-        let streams = [stalled(&service, size).await, stalled(&service, size).await];
+        let streams = some_stalled(&service, size, most).await;
         let send = async || {
             let request = service.scan("cloth").body(vec![7; size]);
             request.send().await.unwrap()
@@ -162,10 +168,7 @@ async fn uploads_are_bounded_and_the_refusal_names_the_setting() {
 #[tokio::test]
 async fn one_address_leaves_half_of_the_uploads_to_others() {
     let service = Service::start(&["--uploads", "4"]).await;
-    let mut streams = Vec::new();
-    for _ in 0..6 {
-        streams.push(stalled(&service, LARGE).await);
-    }
+    let mut streams = some_stalled(&service, LARGE, 6).await;
     for refused in &mut streams[2..] {
         assert_eq!(status(refused).await, "HTTP/1.1 503");
     }
@@ -203,7 +206,7 @@ async fn sessions_are_served_while_large_uploads_stall() {
 async fn a_session_is_read_while_small_uploads_stall() {
     let service = Service::start(&["--uploads", "1"]).await;
     let session = service.session("cloth").await;
-    let _stalled = stalled(&service, 9).await;
+    let _stalled = some_stalled(&service, 9, 4).await;
     let mut refused = stalled(&service, 9).await;
     assert_eq!(status(&mut refused).await, "HTTP/1.1 503");
     for path in [session.clone(), format!("{session}/result")] {

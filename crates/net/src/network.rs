@@ -12,6 +12,7 @@ use crate::planes::{GridPlanes, base_of, cells};
 use crate::runtime::{EngineRuntime, Runtime};
 use crate::symmetry::{Averaging, origins};
 use crate::weights::{self, WeightsCard};
+use std::time::Duration;
 
 /// The most grids, or places of an anchor, that a runtime is given at once; bounds the memory of a call.
 const BATCH: usize = 16;
@@ -65,6 +66,14 @@ impl Network {
     /// Packs the weights now instead of at the first prediction; until then a network needs less memory.
     pub fn prepare(&self) {
         self.forward.prepare();
+    }
+
+    /// Frees buffers that no call has used for so long; a search for the place of an anchor leaves some 40 MiB for each thread. The next
+    /// call makes them anew.
+    pub fn release_idle(&self, unused: Duration) {
+        let runtimes = [Some(&self.forward), self.reverse.as_ref()];
+        let runtimes = runtimes.into_iter().flatten();
+        runtimes.for_each(|runtime| runtime.release_idle(unused));
     }
 
     /// The model card of the weights.

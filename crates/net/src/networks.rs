@@ -1,6 +1,7 @@
 //! The networks that a service has loaded, by name.
 
 use crate::network::Network;
+use std::time::Duration;
 
 /// Loaded networks; at least one.
 #[derive(Debug)]
@@ -30,6 +31,11 @@ impl Networks {
     /// All names, that of the default first.
     pub fn names(&self) -> Vec<&str> {
         self.all().map(|n| n.card().name.as_str()).collect()
+    }
+
+    /// Frees what calls left for later calls, if no call has used it for so long.
+    pub fn release_idle(&self, unused: Duration) {
+        self.all().for_each(|network| network.release_idle(unused));
     }
 
     fn all(&self) -> impl Iterator<Item = &Network> {

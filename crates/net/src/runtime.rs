@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use crate::anchor::{AnchorBatch, AnchorLoss, AnchorProblem};
 use crate::config::UnetConfig;
@@ -14,6 +15,9 @@ use crate::tensors::NamedTensors;
 pub trait Runtime: fmt::Debug + Send + Sync {
     /// Packs the weights now instead of at the first prediction.
     fn prepare(&self) {}
+
+    /// Frees buffers that no call has used for so long.
+    fn release_idle(&self, _unused: Duration) {}
 
     /// Predicts all cells of some grids: `[n, 3, 64, 64]`, in the network's units and frame.
     ///
@@ -46,7 +50,14 @@ pub trait Runtime: fmt::Debug + Send + Sync {
 #[derive(Debug)]
 pub struct EngineRuntime {
     engine: Engine,
-    idle: Mutex<Vec<Scratch>>,
+    idle: Mutex<Vec<IdleScratch>>,
+}
+
+/// Buffers that no call uses.
+#[derive(Debug)]
+struct IdleScratch {
+    buffers: Scratch,
+    since: Instant,
 }
 
 impl EngineRuntime {
@@ -67,11 +78,18 @@ impl EngineRuntime {
 
     /// Buffers that no other call uses.
     fn scratch(&self) -> Scratch {
-        self.lock().pop().unwrap_or_default()
+        let last_used = self.lock().pop();
+        last_used.map(|idle| idle.buffers).unwrap_or_default()
     }
 
-    fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Scratch>> {
-        // A panic under the lock cannot leave the pool half changed: it only pushes and pops.
+    /// Keeps buffers for the next call.
+    fn keep(&self, buffers: Scratch) {
+        let since = Instant::now();
+        self.lock().push(IdleScratch { buffers, since });
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, Vec<IdleScratch>> {
+        // A panic under the lock cannot leave the pool half changed: it only adds and removes.
         self.idle.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -81,12 +99,19 @@ impl Runtime for EngineRuntime {
         self.engine.prepare();
     }
 
+    fn release_idle(&self, unused: Duration) {
+        let mut kept = Vec::new();
+        let mut idle = self.lock();
+        kept.extend(idle.drain(..).filter(|idle| idle.since.elapsed() < unused));
+        *idle = kept;
+    }
+
     fn predict(&self, input: &GridPlanes) -> Result<Vec<f32>, NetError> {
         let mut out = vec![0.0; 3 * input.known.len()];
         let mut scratch = self.scratch();
         self.engine
             .predict(&mut scratch, input.as_input(), &mut out)?;
-        self.lock().push(scratch);
+        self.keep(scratch);
         Ok(out)
     }
 
@@ -120,7 +145,40 @@ impl Runtime for EngineRuntime {
         let mut scratch = self.scratch();
         self.engine
             .gradient(&mut scratch, input.as_input(), &cotangent, out)?;
-        self.lock().push(scratch);
+        self.keep(scratch);
         batch.gradients(&predictions, &by_mask)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use darn_geometry::grid::CELLS;
+
+    use super::*;
+    use crate::fill::InputKind;
+    use crate::frame::FrameKind;
+    use crate::testing::random_tensors;
+
+    #[test]
+    fn buffers_that_no_call_uses_are_freed() {
+        let config = UnetConfig {
+            width: 2,
+            input: InputKind::Membrane,
+            frame: FrameKind::Canonical,
+        };
+        let options = EngineOptions::default();
+        let engine = EngineRuntime::new(&random_tensors(&config), &config, options).unwrap();
+        let input = GridPlanes {
+            positions: vec![0.5; 3 * CELLS],
+            known: vec![1.0; CELLS],
+            base: None,
+            up: None,
+        };
+        let first = engine.predict(&input).unwrap();
+        engine.release_idle(Duration::from_secs(3600));
+        assert_eq!(engine.lock().len(), 1);
+        engine.release_idle(Duration::ZERO);
+        assert!(engine.lock().is_empty());
+        assert_eq!(engine.predict(&input).unwrap(), first);
     }
 }

@@ -232,7 +232,7 @@ impl App {
         let retry_after = self.limits.body_pause.as_secs().clamp(1, 60);
         let slot = permit.map_err(|refusal| match refusal {
             UploadRefusal::Full(limit) => RequestError::UploadsFull { limit, retry_after },
-            UploadRefusal::ShareFull(limit) => RequestError::UploadShareFull { limit, retry_after },
+            UploadRefusal::ShareFull(held) => RequestError::UploadShareFull { held, retry_after },
         })?;
         let client = client.filter(|_| self.sharing == Sharing::ByAddress);
         (self.pool.check_capacity(client)).map_err(|error| of_pool(error, self.limits.deadline))?;

@@ -47,8 +47,8 @@ pub struct ServeArgs {
     #[arg(long, env = "DARN_CONNECTIONS", value_name = "N", value_parser = connections)]
     pub connections: Option<usize>,
 
-    /// Connections of one address (IPv6: of one /64 network) open at once; 0 for any number. Each address may also hold half of the
-    /// uploads, unless this is 0. Behind a reverse proxy, to which all clients owe their address, set 0 or what the proxy opens
+    /// Connections of one address (IPv6: of one /64 network) open at once; 0 for any number. Each address may also hold only as
+    /// many uploads as it leaves free, unless this is 0. Behind a reverse proxy, to which all clients owe their address, set 0 or what the proxy opens
     #[arg(
         long,
         env = "DARN_CONNECTIONS_PER_ADDRESS",
@@ -58,8 +58,8 @@ pub struct ServeArgs {
     )]
     pub connections_per_address: usize,
 
-    /// Bodies above 1 MiB, or of undeclared length, received at once, and as many smaller ones; left out, four times workers and queue
-    /// together. Bodies take at most this plus workers plus queue times the body limit of memory
+    /// Bodies above 1 MiB, or of undeclared length, received at once, and eight times as many smaller ones; left out, four times workers
+    /// and queue together. Bodies take at most this plus workers plus queue times the body limit of memory
     #[arg(long, env = "DARN_UPLOADS", value_name = "N", value_parser = uploads)]
     pub uploads: Option<usize>,
 

@@ -114,11 +114,11 @@ pub enum RequestError {
     },
     /// Too many bodies are being received from one address.
     #[error(
-        "{limit} requests are being received from this address, half of what this service receives at once (DARN_UPLOADS); try again in {retry_after} s"
+        "{held} requests are being received from this address, and one address may not take more than it leaves free (DARN_UPLOADS); try again in {retry_after} s"
     )]
     UploadShareFull {
-        /// Most bodies received at once from one address.
-        limit: usize,
+        /// Bodies being received from this address.
+        held: usize,
         /// Suggested seconds to wait.
         retry_after: u64,
     },

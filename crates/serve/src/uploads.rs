@@ -12,6 +12,8 @@ use super::{client_address::ClientAddress, parameters};
 
 /// Most bytes of a small body. Edits of a session are never larger.
 const SMALL_BODY: u64 = parameters::MAX_BYTES as u64;
+/// Slots for small bodies for each slot for large ones. A small body costs its client so little that many are sent at once.
+const SMALL_FOR_LARGE: usize = 8;
 /// Most requests without a body between their arrival and the queue; each holds next to nothing.
 const MAX_BODILESS: usize = 1 << 20;
 
@@ -43,11 +45,12 @@ impl BodySize {
 pub enum UploadRefusal {
     /// So many bodies of its size are being received.
     Full(usize),
-    /// So many bodies of its size are being received from its address.
+    /// So many bodies of its size are being received from its address, and no more could be received beside them from all others.
     ShareFull(usize),
 }
 
-/// The bodies being received. Those of each size have slots of their own, and one address may hold half of them.
+/// The bodies being received. Those of each size have slots of their own, and one address may hold as many of them as are left free: half of
+/// them when it is alone, and so many addresses as halve them again and again until one is left are needed to take them all.
 #[derive(Debug)]
 pub struct Uploads {
     bodiless: Slots,
@@ -56,16 +59,12 @@ pub struct Uploads {
 }
 
 impl Uploads {
-    /// So many slots for small bodies, and as many for large ones. `shared` when one address may hold half of them only.
+    /// So many slots for large bodies, and [`SMALL_FOR_LARGE`] times as many for small ones.
     pub fn new(slots: usize, sharing: Sharing) -> Self {
-        let share = match sharing {
-            Sharing::ByAddress => slots.div_ceil(2),
-            Sharing::Anybody => slots,
-        };
         Self {
-            bodiless: Slots::new(MAX_BODILESS, MAX_BODILESS),
-            small: Slots::new(slots, share),
-            large: Slots::new(slots, share),
+            bodiless: Slots::new(MAX_BODILESS, Sharing::Anybody),
+            small: Slots::new(SMALL_FOR_LARGE * slots, sharing),
+            large: Slots::new(slots, sharing),
         }
     }
 
@@ -99,7 +98,7 @@ impl Uploads {
 /// Whether addresses tell clients apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sharing {
-    /// One address may hold half of the slots.
+    /// One address may hold as many slots as it leaves free.
     ByAddress,
     /// Anybody may hold all slots: behind a proxy all clients have one address.
     Anybody,
@@ -110,32 +109,34 @@ pub enum Sharing {
 struct Slots {
     free: Arc<Semaphore>,
     limit: usize,
-    /// Most slots of one address.
-    share: usize,
+    sharing: Sharing,
     held: Arc<Held>,
 }
 
 impl Slots {
-    fn new(limit: usize, share: usize) -> Self {
+    fn new(limit: usize, sharing: Sharing) -> Self {
         Self {
             free: Arc::new(Semaphore::new(limit)),
             limit,
-            share,
+            sharing,
             held: Arc::default(),
         }
     }
 
     fn take(&self, client: Option<ClientAddress>) -> Result<UploadSlot, UploadRefusal> {
-        let share = match client {
-            Some(client) if self.share < self.limit => {
-                let share = Held::take(&self.held, client, self.share);
-                Some(share.ok_or(UploadRefusal::ShareFull(self.share))?)
+        // Counted with the slot: another request may take slots meanwhile, so the share is that of a moment ago at worst.
+        let free = self.free.available_permits();
+        let slot = Arc::clone(&self.free).try_acquire_owned();
+        let slot = slot.map_err(|_| UploadRefusal::Full(self.limit))?;
+        let share = match (self.sharing, client) {
+            (Sharing::ByAddress, Some(client)) => {
+                let share = Held::take(&self.held, client, free);
+                Some(share.map_err(UploadRefusal::ShareFull)?)
             }
             _ => None,
         };
-        let slot = Arc::clone(&self.free).try_acquire_owned();
         Ok(UploadSlot {
-            _slot: slot.map_err(|_| UploadRefusal::Full(self.limit))?,
+            _slot: slot,
             _share: share,
         })
     }
@@ -158,16 +159,19 @@ impl Held {
     }
 
     /// One more slot for a client, unless it holds `most` already.
-    fn take(self: &Arc<Self>, client: ClientAddress, most: usize) -> Option<Share> {
+    ///
+    /// # Errors
+    /// The number of slots that it holds.
+    fn take(self: &Arc<Self>, client: ClientAddress, most: usize) -> Result<Share, usize> {
         let mut held = self.lock();
         let count = held.get(&client).copied().unwrap_or(0);
         if count >= most {
-            return None;
+            return Err(count);
         }
         held.insert(client, count + 1);
         drop(held);
         let held = Arc::clone(self);
-        Some(Share { client, held })
+        Ok(Share { client, held })
     }
 }
 
@@ -197,6 +201,19 @@ mod tests {
     }
 
     #[test]
+    fn many_addresses_leave_a_slot_for_one_more() {
+        let uploads = Uploads::new(18, Sharing::ByAddress);
+        let slots = (0..6_u8).flat_map(|last| {
+            let all = std::iter::repeat_with(move || (BodySize::Small, client(last)));
+            all.map_while(|(size, client)| uploads.take(size, client).ok())
+                .collect::<Vec<_>>()
+        });
+        let slots: Vec<UploadSlot> = slots.collect();
+        assert!(slots.len() > 100);
+        assert!(uploads.take(BodySize::Small, client(7)).is_ok());
+    }
+
+    #[test]
     fn one_address_holds_at_most_half_of_the_slots() {
         let uploads = Uploads::new(3, Sharing::ByAddress);
         let take = |size, last| uploads.take(size, client(last));
@@ -209,7 +226,11 @@ mod tests {
         let refusal = take(BodySize::Large, 2).unwrap_err();
         assert_eq!(refusal, UploadRefusal::Full(3));
         drop(first);
-        assert!(take(BodySize::Large, 1).is_ok());
+        assert!(
+            take(BodySize::Large, 1).is_err(),
+            "it holds as many as are free"
+        );
+        assert!(take(BodySize::Large, 3).is_ok());
     }
 
     #[test]
