@@ -30,7 +30,7 @@ pub fn run(settings: &ServeCommand) -> Result<(), Failure> {
         scan_limits: settings.scan_limits(),
         ..network::mender(&settings.network)?
     });
-    let networks = Arc::clone(&mender);
-    allocator::give_back_when_idle(move |unused| networks.networks.release_idle(unused));
+    let idle = Arc::clone(&mender);
+    allocator::give_back_when_idle(move |unused| idle.release_idle(unused));
     darn_serve::run(serve, Arc::new(SharedMender(mender))).or_fail("serve")
 }

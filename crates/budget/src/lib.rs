@@ -4,9 +4,11 @@
 //! Work, memory and output are counted from the input alone, so that the same request is always refused or always answered.
 
 mod memory;
+mod spares;
 mod work;
 
 pub use memory::{Memory, MemoryPool};
+pub use spares::Spares;
 pub use work::{NANOSECONDS_PER_SECOND, Steps};
 
 use std::fmt;

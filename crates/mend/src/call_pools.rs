@@ -3,9 +3,9 @@
 //! With one pool for all calls, the small steps of a small mend would wait behind the large ones of others: a thread of rayon takes no new
 //! work before its own list is empty. With a pool for each, the operating system shares the processors between calls.
 
-use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
-use darn_budget::Budget;
+use darn_budget::{Budget, Spares};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// Most threads of a call. Mends gain little beyond it, and a machine with many processors runs many calls.
@@ -13,11 +13,11 @@ const MAX_THREADS: usize = 8;
 /// Calls that hold this many bytes are large.
 const LARGE: usize = 32 << 20;
 
-/// Thread pools of calls; one that is not in use is kept for the next call.
+/// Thread pools of calls; one that is not in use is kept for the next call for a while.
 #[derive(Debug)]
 pub struct CallPools {
     threads: usize,
-    idle: Mutex<Vec<ThreadPool>>,
+    spare: Spares<ThreadPool>,
 }
 
 impl Default for CallPools {
@@ -25,7 +25,7 @@ impl Default for CallPools {
     fn default() -> CallPools {
         CallPools {
             threads: rayon::current_num_threads().min(MAX_THREADS),
-            idle: Mutex::default(),
+            spare: Spares::default(),
         }
     }
 }
@@ -34,8 +34,7 @@ impl CallPools {
     /// Runs a call whose parallel work has its own threads; on the global pool where the system gives no more threads. The result does not
     /// depend on where it runs.
     pub fn run<T: Send>(&self, budget: &Budget, call: impl FnOnce() -> T + Send) -> T {
-        let kept = self.idle().pop();
-        let pool = kept.or_else(|| {
+        let pool = self.spare.take().or_else(|| {
             let threads = ThreadPoolBuilder::new().num_threads(self.threads);
             let named = threads.thread_name(|k| format!("call-{k}"));
             named.build().ok()
@@ -46,20 +45,20 @@ impl CallPools {
         let outcome = pool.install(call);
         // The allocator keeps freed memory for each thread: after a large call the threads end, and their memory is free for all.
         if budget.held() < LARGE {
-            self.idle().push(pool);
+            self.spare.keep(pool);
         }
         outcome
     }
 
-    fn idle(&self) -> std::sync::MutexGuard<'_, Vec<ThreadPool>> {
-        // No change under the lock can panic half-way.
-        self.idle.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Ends the threads that no call has used for so long.
+    pub(crate) fn release_idle(&self, unused: Duration) {
+        self.spare.release(unused);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::sync::mpsc;
+    use std::sync::{Mutex, mpsc};
     use std::thread;
 
     use rayon::prelude::*;
@@ -90,6 +89,6 @@ mod tests {
             assert_eq!(sum, 499_500);
             drop(release);
         });
-        assert_eq!(pools.idle().len(), 2);
+        assert_eq!(pools.spare.count(), 2);
     }
 }

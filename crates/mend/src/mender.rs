@@ -1,6 +1,7 @@
 //! The loaded networks with their limits, and a call to them.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use darn_budget::Budget;
 use darn_geometry::patch::PatchWork;
@@ -32,6 +33,12 @@ impl NetworkMender {
             scan_limits: ScanLimits::default(),
             pools: CallPools::default(),
         }
+    }
+
+    /// Frees buffers and threads that no call has used for so long; the next call makes them anew.
+    pub fn release_idle(&self, unused: Duration) {
+        self.networks.release_idle(unused);
+        self.pools.release_idle(unused);
     }
 }
 

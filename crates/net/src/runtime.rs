@@ -1,8 +1,9 @@
 //! The interface between [`Network`](crate::Network) and what computes its predictions, and its implementation by darn's own engine.
 
 use std::fmt;
-use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use darn_budget::Spares;
 
 use crate::anchor::{AnchorBatch, AnchorLoss, AnchorProblem};
 use crate::config::UnetConfig;
@@ -50,14 +51,7 @@ pub trait Runtime: fmt::Debug + Send + Sync {
 #[derive(Debug)]
 pub struct EngineRuntime {
     engine: Engine,
-    idle: Mutex<Vec<IdleScratch>>,
-}
-
-/// Buffers that no call uses.
-#[derive(Debug)]
-struct IdleScratch {
-    buffers: Scratch,
-    since: Instant,
+    spare: Spares<Scratch>,
 }
 
 impl EngineRuntime {
@@ -72,25 +66,8 @@ impl EngineRuntime {
     ) -> Result<EngineRuntime, NetError> {
         Ok(EngineRuntime {
             engine: Engine::new(tensors, config, options)?,
-            idle: Mutex::default(),
+            spare: Spares::default(),
         })
-    }
-
-    /// Buffers that no other call uses.
-    fn scratch(&self) -> Scratch {
-        let last_used = self.lock().pop();
-        last_used.map(|idle| idle.buffers).unwrap_or_default()
-    }
-
-    /// Keeps buffers for the next call.
-    fn keep(&self, buffers: Scratch) {
-        let since = Instant::now();
-        self.lock().push(IdleScratch { buffers, since });
-    }
-
-    fn lock(&self) -> std::sync::MutexGuard<'_, Vec<IdleScratch>> {
-        // A panic under the lock cannot leave the pool half changed: it only adds and removes.
-        self.idle.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -100,18 +77,15 @@ impl Runtime for EngineRuntime {
     }
 
     fn release_idle(&self, unused: Duration) {
-        let mut kept = Vec::new();
-        let mut idle = self.lock();
-        kept.extend(idle.drain(..).filter(|idle| idle.since.elapsed() < unused));
-        *idle = kept;
+        self.spare.release(unused);
     }
 
     fn predict(&self, input: &GridPlanes) -> Result<Vec<f32>, NetError> {
         let mut out = vec![0.0; 3 * input.known.len()];
-        let mut scratch = self.scratch();
+        let mut scratch = self.spare.take().unwrap_or_default();
         self.engine
             .predict(&mut scratch, input.as_input(), &mut out)?;
-        self.keep(scratch);
+        self.spare.keep(scratch);
         Ok(out)
     }
 
@@ -142,10 +116,10 @@ impl Runtime for EngineRuntime {
             by_positions: &mut by_positions,
             by_known: &mut by_mask,
         };
-        let mut scratch = self.scratch();
+        let mut scratch = self.spare.take().unwrap_or_default();
         self.engine
             .gradient(&mut scratch, input.as_input(), &cotangent, out)?;
-        self.keep(scratch);
+        self.spare.keep(scratch);
         batch.gradients(&predictions, &by_mask)
     }
 }
@@ -176,9 +150,9 @@ mod tests {
         };
         let first = engine.predict(&input).unwrap();
         engine.release_idle(Duration::from_secs(3600));
-        assert_eq!(engine.lock().len(), 1);
+        assert_eq!(engine.spare.count(), 1);
         engine.release_idle(Duration::ZERO);
-        assert!(engine.lock().is_empty());
+        assert_eq!(engine.spare.count(), 0);
         assert_eq!(engine.predict(&input).unwrap(), first);
     }
 }
