@@ -21,9 +21,9 @@ use darn_net::{AnchorLoss, AnchorProblem};
 const FAR: f64 = 100.0;
 
 /// Nanoseconds of work of the network a cell.
-const LOSS_WORK: u64 = 4_000_000;
+const LOSS_WORK: u64 = 5_000_000;
 /// The same with the gradient.
-const GRADIENT_WORK: u64 = 10_000_000;
+const GRADIENT_WORK: u64 = 12_500_000;
 
 /// The network's loss of an anchor at a target, for each cell.
 struct AnchorLosses<'a> {

@@ -155,7 +155,8 @@ impl ServeArgs {
     }
 }
 
-/// Bytes of memory of the machine, or what its control group allows where that is less; 4 GiB where the system says neither.
+/// Bytes of memory of the machine, or what its control group or the process's limit of address space allows where that is less; 4 GiB where the
+/// system says nothing.
 fn machine_memory() -> usize {
     let kibibytes = |text: String| -> Option<usize> {
         let row = text
@@ -174,7 +175,9 @@ fn machine_memory() -> usize {
         let text = std::fs::read_to_string(path).ok()?;
         text.trim().parse::<usize>().ok()
     });
-    (machine.into_iter().chain(group).min()).unwrap_or(UNKNOWN_MEMORY)
+    let own = process_limit("Max address space");
+    let known = machine.into_iter().chain(group).chain(own);
+    known.min().unwrap_or(UNKNOWN_MEMORY)
 }
 
 fn workers(text: &str) -> Result<usize, String> {
@@ -199,8 +202,13 @@ fn connections_per_address(text: &str) -> Result<usize, String> {
 
 /// Files that the process may open; `None` where the system does not say.
 fn open_file_limit() -> Option<usize> {
+    process_limit("Max open files")
+}
+
+/// A soft limit of the process by its name in `/proc/self/limits`; `None` where there is none, or the system does not say.
+fn process_limit(name: &str) -> Option<usize> {
     let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
-    let row = (limits.lines()).find_map(|line| line.strip_prefix("Max open files"))?;
+    let row = limits.lines().find_map(|line| line.strip_prefix(name))?;
     row.split_whitespace().next()?.parse().ok()
 }
 
