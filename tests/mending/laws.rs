@@ -93,6 +93,38 @@ fn the_patch_of_a_cylinder_lies_on_the_cylinder() {
 }
 
 #[test]
+fn smooth_cloth_that_does_not_lie_flat_gets_no_folds() {
+    let surfaces: [fn(f32, f32) -> f32; 3] = [
+        |x, y| 1.2 * (x * x - y * y),
+        |x, y| (0.8 - x * x - y * y).sqrt(),
+        |x, y| 0.3 * (4.0 * x).tanh() * (1.6 * y).cos(),
+    ];
+    for (k, surface) in surfaces.iter().enumerate() {
+        for hole in holes() {
+            let cut = holed(&laid(|u, v| [u, v, surface(u - 0.5, v - 0.5)]), &hole);
+            let mended = mended(&packed(&cut.mesh, &[]), &Constraints::default()).unwrap();
+            let after = MendedScan::of(&mended.bytes);
+            let off =
+                |p: &Vec3| (p.z - f64::from(surface(p.x as f32 - 0.5, p.y as f32 - 0.5))).abs();
+            let off: Vec<f64> = after.new_positions().iter().map(off).collect();
+            let mean = off.iter().sum::<f64>() / off.len() as f64;
+            let patch = mended.report.holes[0].patch.as_ref().unwrap();
+            assert!(mean < 0.001, "surface {k}, {hole:?}: {mean}");
+        }
+    }
+}
+
+#[test]
+fn the_folds_of_draped_cloth_go_on() {
+    for (k, hole) in holes().iter().enumerate() {
+        let cut = holed(sheet(k), hole);
+        let mended = mended(&packed(&cut.mesh, &[]), &Constraints::default()).unwrap();
+        let patch = mended.report.holes[0].patch.as_ref().unwrap();
+        assert!(patch.network_share > 0.9, "{k}: {}", patch.network_share);
+    }
+}
+
+#[test]
 fn the_same_scan_gives_the_same_bytes() {
     let bytes = packed(&holed(sheet(1), &ROUND).mesh, &[]);
     let once = mended(&bytes, &Constraints::default()).unwrap().bytes;

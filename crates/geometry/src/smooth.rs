@@ -15,6 +15,9 @@ use crate::mesh::Vec3;
 /// cells.
 const TENSION: f64 = 1.0 / (15.0 * 15.0);
 
+/// Weight of the thin plate in [`Smooth::MinimumVariation`]. It dominates at lengths above 1 / √weight = 8 cells.
+const STIFFNESS: f64 = 1.0 / (8.0 * 8.0);
+
 /// An energy of the grid, the same for each coordinate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -27,13 +30,16 @@ pub enum Smooth {
     /// A thin plate under a little tension: continuous slopes across the rim, and no overshoot where it extrapolates
     /// beyond all known cells.
     TautPlate,
+    /// Σ x_uuu² + 3 x_uuv² + 3 x_uvv² + x_vvv² of third differences, and a little of the thin plate: continuous curvature across the rim, as in surfaces
+    /// of minimum variation of curvature (Moreton, Séquin 1992). Noise at the rim grows in the hole.
+    MinimumVariation,
 }
 
 /// A weighted difference of cells: Σ coefficient · position.
 struct Difference {
     weight: f64,
     /// Pairs (cell, coefficient); the first `count` are used.
-    terms: [(usize, f64); 4],
+    terms: [(usize, f64); 6],
     count: usize,
 }
 
@@ -42,8 +48,15 @@ impl Difference {
         let term = |k: usize| terms.get(k).copied().unwrap_or_default();
         Difference {
             weight,
-            terms: [term(0), term(1), term(2), term(3)],
+            terms: [0, 1, 2, 3, 4, 5].map(term),
             count: N,
+        }
+    }
+
+    fn weighted(self, by: f64) -> Difference {
+        Difference {
+            weight: self.weight * by,
+            ..self
         }
     }
 
@@ -80,7 +93,7 @@ pub fn smooth_all(
     let mut system = Symmetric::zero(open.len());
     let mut rhs = vec![vec![[0.0; 3]; open.len()]; sheets.len()];
     let present = |k: usize| hole[k] || known[k];
-    let mut free = Vec::with_capacity(4);
+    let mut free = Vec::with_capacity(6);
     let mut add = |difference: Difference| {
         let terms = difference.terms();
         let counts = terms.iter().all(|&(k, _)| present(k)) && terms.iter().any(|&(k, _)| hole[k]);
@@ -100,14 +113,21 @@ pub fn smooth_all(
             }
         }
     };
-    if energy != Smooth::Membrane {
-        (0..CELLS).flat_map(bendings).for_each(&mut add);
-    }
-    let tension = match energy {
-        Smooth::Membrane => 1.0,
-        Smooth::ThinPlate => 0.0,
-        Smooth::TautPlate => TENSION,
+    let (stiffness, tension) = match energy {
+        Smooth::Membrane => (0.0, 1.0),
+        Smooth::ThinPlate => (1.0, 0.0),
+        Smooth::TautPlate => (1.0, TENSION),
+        Smooth::MinimumVariation => (STIFFNESS, 0.0),
     };
+    if energy == Smooth::MinimumVariation {
+        (0..CELLS).flat_map(variations).for_each(&mut add);
+    }
+    if stiffness > 0.0 {
+        (0..CELLS)
+            .flat_map(bendings)
+            .map(|bending| bending.weighted(stiffness))
+            .for_each(&mut add);
+    }
     if tension > 0.0 {
         neighbour_pairs()
             .map(|(a, b)| Difference::new(tension, [(a, -1.0), (b, 1.0)]))
@@ -149,6 +169,38 @@ fn bendings(k: usize) -> impl Iterator<Item = Difference> {
     [along_u, along_v, mixed].into_iter().flatten()
 }
 
+/// The third differences whose cell of lowest index is `k`: along u, along v, and mixed.
+fn variations(k: usize) -> impl Iterator<Item = Difference> {
+    let (i, j) = (k % SIDE, k / SIDE);
+    let straight = |step: usize| {
+        let terms = [
+            (k, 1.0),
+            (k + step, -3.0),
+            (k + 2 * step, 3.0),
+            (k + 3 * step, -1.0),
+        ];
+        Difference::new(1.0, terms)
+    };
+    // Two steps along `twice`, one along `once`.
+    let mixed = |twice: usize, once: usize| {
+        let row = |from: usize, sign: f64| {
+            [
+                (from, sign),
+                (from + twice, -2.0 * sign),
+                (from + 2 * twice, sign),
+            ]
+        };
+        let ([a, b, c], [d, e, f]) = (row(k, 1.0), row(k + once, -1.0));
+        Difference::new(3.0, [a, b, c, d, e, f])
+    };
+    let along_u = (i + 3 < SIDE).then(|| straight(1));
+    let along_v = (j + 3 < SIDE).then(|| straight(SIDE));
+    let along_u_twice = (i + 2 < SIDE && j + 1 < SIDE).then(|| mixed(1, SIDE));
+    let along_v_twice = (i + 1 < SIDE && j + 2 < SIDE).then(|| mixed(SIDE, 1));
+    let all = [along_u, along_v, along_u_twice, along_v_twice];
+    all.into_iter().flatten()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -178,6 +230,19 @@ mod tests {
         assert!(taut < 0.3 * membrane, "{taut} {membrane}");
         let wave = |u: f64, v: f64| Vec3::new(u, v, 0.1 * (6.0 * u).sin() * (5.0 * v).cos());
         assert!(worst(wave, Smooth::TautPlate) < 0.5 * worst(wave, Smooth::Membrane));
+    }
+
+    #[test]
+    fn a_surface_of_minimum_variation_continues_curvature() {
+        // On a quadratic surface no third difference costs anything; the thin plate's share costs a little.
+        let bent = |u: f64, v: f64| Vec3::new(u, v, (u - 0.5).powi(2) - 0.5 * v * v);
+        let dome =
+            |u: f64, v: f64| Vec3::new(u, v, (1.0 - (u - 0.5).powi(2) - (v - 0.5).powi(2)).sqrt());
+        for surface in [&bent as &dyn Fn(f64, f64) -> Vec3, &dome] {
+            let [thin, least] =
+                [Smooth::ThinPlate, Smooth::MinimumVariation].map(|energy| worst(surface, energy));
+            assert!(least < 0.3 * thin, "{least} {thin}");
+        }
     }
 
     #[test]

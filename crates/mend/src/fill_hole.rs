@@ -5,7 +5,7 @@ use std::time::Instant;
 use crate::constraints::HoleConstraints;
 use crate::context::HoleContext;
 use crate::error::MendError;
-use crate::hole::Hole;
+use crate::hole::{Hole, patch_options};
 use crate::select::HoleRequest;
 use crate::timings::milliseconds;
 use darn_contract::v1;
@@ -21,6 +21,8 @@ pub struct PatchDraft<'a> {
     pub hole: &'a Hole,
     /// The triangles.
     pub patch: Patch,
+    /// The share of the network's folds that was kept.
+    pub network_share: f32,
     /// What the patch should keep to.
     pub constraints: HoleConstraints<'a>,
     /// Milliseconds so far.
@@ -55,6 +57,7 @@ impl<'a> HoleContext<'a> {
         Ok(PatchDraft {
             hole,
             patch,
+            network_share: unedited.network_share,
             constraints,
             timings,
         })
@@ -67,7 +70,11 @@ impl<'a> HoleContext<'a> {
         let stretch = |patch: &Patch| quality::measure(patch, &hole.region).stretch_max;
         let usual = stretch(&unedited.patch);
         let most = stretch_limit(usual);
-        let work = PatchWork::from(self.call);
+        let options = patch_options(self.call, unedited.network_share);
+        let work = PatchWork {
+            options: &options,
+            budget: self.call.budget,
+        };
         let mut share = 1.0;
         for _ in 0..MAX_TRIES {
             let each = unedited.filled.iter().zip(moved);

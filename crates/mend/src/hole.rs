@@ -7,13 +7,14 @@ use crate::edit::{HoleCells, ReachLimit};
 use crate::error::MendError;
 use crate::inpainter::{FillKey, Inpainter};
 use crate::mender::Call;
+use crate::network_share::WidenedHole;
 use crate::timings::milliseconds;
 use darn_contract::v1;
 use darn_geometry::flatten::Chart;
 use darn_geometry::grid::{self, CELLS, Grid, NormalGrid, Normalisation};
 use darn_geometry::mesh::region::Region;
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
-use darn_geometry::patch::{Patch, PatchPlan, PatchWork, Pull};
+use darn_geometry::patch::{Patch, PatchOptions, PatchPlan, PatchWork, Pull};
 use darn_geometry::polygon;
 use darn_net::Averaging;
 
@@ -61,6 +62,8 @@ pub struct UneditedCloths(Mutex<Vec<(FillKey, Arc<UneditedCloth>)>>);
 
 /// A hole's cloth without constraints.
 pub struct UneditedCloth {
+    /// The share of the network's movement from a smooth surface that was kept, 0 to 1.
+    pub network_share: f32,
     /// The network's answer for every cell, scene space.
     pub predicted: Vec<Vec3>,
     /// For every cell the scan's position where it is known, the network's elsewhere; scene space.
@@ -117,14 +120,33 @@ impl Hole {
     fn fill(&self, inpainter: &Inpainter, call: Call) -> Result<UneditedCloth, MendError> {
         let started = Instant::now();
         call.budget.spend(FILL_WORK)?;
-        let answers =
-            inpainter.fill(std::slice::from_ref(&self.normal_grid()), Averaging::Flips)?;
-        let predicted = self.in_scene(answers.first().map_or(&[], Vec::as_slice));
+        let grid = self.normal_grid();
+        let widened = WidenedHole::new(self);
+        let (answers, network_share) = rayon::join(
+            || inpainter.fill(std::slice::from_ref(&grid), Averaging::Flips),
+            || widened.network_share(inpainter, call.budget),
+        );
+        let (answers, network_share) = (answers?, network_share?);
+        let mut answer = answers.into_iter().next().unwrap_or_default();
+        if network_share < 1.0
+            && let Some(fair) = widened.fair_fill(call.budget)?
+        {
+            for (network, fair) in answer.iter_mut().zip(&fair) {
+                (0..3).for_each(|d| network[d] = fair[d] + network_share * (network[d] - fair[d]));
+            }
+        }
+        let predicted = self.in_scene(&answer);
         let net_ms = milliseconds(started);
         let started = Instant::now();
         let filled = self.filled(&predicted);
-        let patch = self.patch(&filled, &[], call.into())?;
+        let options = patch_options(call, network_share);
+        let work = PatchWork {
+            options: &options,
+            budget: call.budget,
+        };
+        let patch = self.patch(&filled, &[], work)?;
         Ok(UneditedCloth {
+            network_share,
             predicted,
             filled,
             patch,
@@ -173,6 +195,14 @@ impl Hole {
         let grid = CELLS * (24 + 1 + 9 + 12);
         region + grid + self.plan.bytes() + self.unedited.bytes()
     }
+}
+
+/// How a patch is made where the network is trusted so far. Fair cloth may be strained: in a hole without folds, nothing but the plate says what area
+/// the cloth has.
+pub fn patch_options(call: Call, network_share: f32) -> PatchOptions {
+    let mut options = call.mender.limits.patch;
+    options.strain.max_strain += f64::from(1.0 - network_share);
+    options
 }
 
 impl UneditedCloths {

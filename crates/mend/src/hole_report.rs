@@ -21,6 +21,8 @@ const SUSPICIOUS: f64 = 1.5;
 /// A loose piece lies in the hole when all of its border is nearer to the patch than this many edges of the hole's rim.
 const IN_THE_HOLE: f64 = 1.5;
 
+/// A note is written when less than this share of the network's folds was kept.
+const MOSTLY_FAIR: f32 = 0.5;
 /// Most loose pieces that a note names.
 const MAX_NAMED: usize = 20;
 /// Nanoseconds of work a search for the nearest vertex of a patch.
@@ -49,6 +51,7 @@ impl<'a> PatchDraft<'a> {
         let PatchDraft {
             hole,
             patch,
+            network_share,
             constraints,
             mut timings,
         } = self;
@@ -58,6 +61,12 @@ impl<'a> PatchDraft<'a> {
         let quality = quality::measure(&patch, &hole.region);
         timings.report = milliseconds(started);
         let mut notes = notes(hole, &quality);
+        if network_share < MOSTLY_FAIR {
+            notes.push(format!(
+                "the network's folds do not fit the cloth around the hole; it was filled with {:.0} % of them, the rest is a smooth surface",
+                100.0 * network_share
+            ));
+        }
         notes.extend(loose_pieces_note(hole, &patch, welded, budget)?);
         notes.extend(constraints.notes(&kept.anchors));
         let rim = &welded.loops[hole.id as usize];
@@ -68,7 +77,10 @@ impl<'a> PatchDraft<'a> {
             vertices: rim.vertices.len() as u32,
             chart: Some(chart_report(hole)),
             grid: Some(hole.report),
-            patch: Some(patch_report(&patch, &quality)),
+            patch: Some(v1::PatchReport {
+                network_share: f64::from(network_share),
+                ..patch_report(&patch, &quality)
+            }),
             timings: Some(timings),
             notes,
             anchors: kept.anchors,
@@ -108,6 +120,7 @@ fn patch_report(patch: &Patch, quality: &Quality) -> v1::PatchReport {
             _ => "strain_limiting+collisions",
         }
         .to_owned(),
+        ..v1::PatchReport::default()
     }
 }
 

@@ -26,6 +26,7 @@ mod limits;
 mod mender;
 mod moved_fill;
 mod nearest_hole;
+mod network_share;
 mod picture;
 mod port;
 mod prepare;

@@ -17,8 +17,8 @@ use darn_geometry::mesh::denoise::denoise;
 use darn_geometry::mesh::index::LoopId;
 use darn_geometry::mesh::layers::layers_near;
 use darn_geometry::mesh::region::{self, BoundedMesh, Region, RegionError};
-use darn_geometry::mesh::{TriMesh, Vec2};
-use darn_geometry::patch::{self, PatchError};
+use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
+use darn_geometry::patch::{self, PatchError, PatchMesh, PatchMetric};
 use darn_geometry::polygon::{extent, inside};
 
 /// Share of the grid's side that the hole should take, so that hole and context share the grid as in training.
@@ -31,8 +31,8 @@ const SHRINK: f64 = 0.6;
 const COLLAR: f64 = 0.2;
 /// Tries with smaller and smaller regions.
 const MAX_TRIES: usize = 4;
-/// Nanoseconds of work of a grid and its plate.
-const GRID_WORK: u64 = 8_000_000;
+/// Nanoseconds of work of a grid and its plates.
+const GRID_WORK: u64 = 9_000_000;
 /// Nanoseconds of work a face of the scan in the search for other layers near a hole.
 const LAYERS_WORK: u64 = 10;
 
@@ -102,6 +102,7 @@ struct SampledGrid {
     normal: Normalisation,
     cells: HoleCells,
     base: Option<Vec<[f32; 3]>>,
+    metric: Option<PatchMetric>,
     milliseconds: f64,
 }
 
@@ -172,42 +173,28 @@ impl Preparation<'_> {
         let (id, welded, call) = (self.id, self.welded, self.call);
         let seen = flat.smooth.as_ref().unwrap_or(&flat.region);
         let rim_uv = flat.rim_uv();
-        let sample = || {
+        let sample = || sample(id, seen, &flat.chart, call.budget);
+        let triangulate = || {
             let started = Instant::now();
-            call.budget.spend(GRID_WORK)?;
-            let grid = flatten::raster(&seen.mesh, &flat.chart);
-            let normal = grid.normalisation().ok_or(MendError::TooLittleKnown {
-                hole: id,
-                known: grid.known_count(),
-            })?;
-            let cells = HoleCells::new(|k| !grid.known[k] && inside(&rim_uv, grid::cell_centre(k)));
-            let base = darn_net::plate(&grid.normalised(&normal).positions, &grid.known);
-            Ok::<_, MendError>(SampledGrid {
-                grid,
-                normal,
-                cells,
-                base,
-                milliseconds: milliseconds(started),
-            })
+            let mesh = PatchMesh::in_scan(&welded.surface.mesh, seen, &flat.chart, call);
+            mesh.map(|mesh| (mesh, milliseconds(started)))
         };
-        let plan = || {
-            let started = Instant::now();
-            let mesh = &welded.surface.mesh;
-            // The largest distance that cloth of the hole's extent can have from its rim.
-            let beyond = 0.5 * extent(&rim_uv) * flat.chart.frame.side;
-            call.budget.spend(LAYERS_WORK * mesh.faces.len() as u64)?;
-            let others = layers_near(mesh, &flat.region, beyond);
-            let plan = patch::plan_in(mesh, seen, &flat.chart, call)
-                .and_then(|plan| match &flat.smooth {
-                    Some(_) => plan.with_region_at(&flat.region.mesh.positions),
-                    None => Ok(plan),
-                })
-                .map_err(MendError::patch(id))?;
-            Ok::<_, MendError>((plan.with_layers(&others), milliseconds(started)))
-        };
-        let (sampled, planned) = rayon::join(sample, plan);
+        let (sampled, mesh) = rayon::join(sample, triangulate);
         let sampled = sampled?;
-        let (plan, patch) = planned?;
+        let (mesh, triangulate_ms) = mesh.map_err(MendError::patch(id))?;
+        let started = Instant::now();
+        let plan = (mesh.plan(seen, &flat.chart, sampled.metric.as_ref(), call))
+            .and_then(|plan| match &flat.smooth {
+                Some(_) => plan.with_region_at(&flat.region.mesh.positions),
+                None => Ok(plan),
+            })
+            .map_err(MendError::patch(id))?;
+        // The largest distance that cloth of the hole's extent can have from its rim.
+        let beyond = 0.5 * extent(&rim_uv) * flat.chart.frame.side;
+        let scan = &welded.surface.mesh;
+        call.budget.spend(LAYERS_WORK * scan.faces.len() as u64)?;
+        let plan = plan.with_layers(&layers_near(scan, &flat.region, beyond));
+        let patch = triangulate_ms + milliseconds(started);
         let timings = v1::HoleTimings {
             raster: sampled.milliseconds,
             patch,
@@ -242,9 +229,49 @@ impl Preparation<'_> {
 impl FlatRegion {
     /// The rim on the chart's unit square.
     fn rim_uv(&self) -> Vec<Vec2> {
-        let uv = |v: &u32| self.chart.uv(*v);
-        self.region.rim.iter().map(uv).collect()
+        rim_uv(&self.region, &self.chart)
     }
+}
+
+fn rim_uv(region: &Region, chart: &Chart) -> Vec<Vec2> {
+    region.rim.iter().map(|v| chart.uv(*v)).collect()
+}
+
+/// Samples the grid, and continues positions and metric into its unknown cells.
+fn sample(
+    id: u32,
+    seen: &Region,
+    chart: &Chart,
+    budget: &Budget,
+) -> Result<SampledGrid, MendError> {
+    let started = Instant::now();
+    let rim_uv = rim_uv(seen, chart);
+    budget.spend(GRID_WORK)?;
+    let grid = flatten::raster(&seen.mesh, chart);
+    let normal = grid.normalisation().ok_or(MendError::TooLittleKnown {
+        hole: id,
+        known: grid.known_count(),
+    })?;
+    let cells = HoleCells::new(|k| !grid.known[k] && inside(&rim_uv, grid::cell_centre(k)));
+    let strained = patch::log_stretch(seen, chart);
+    let strained: Vec<[f32; 3]> = strained.iter().map(|s| s.cast::<f32>().into()).collect();
+    let sheets = [&grid.normalised(&normal).positions[..], &strained];
+    let mut filled = darn_net::plates(&sheets, &grid.known).unwrap_or_default();
+    let metric = (filled.len() == sheets.len())
+        .then(|| filled.pop())
+        .flatten();
+    let metric = metric.map(|cells| {
+        let wide = cells.iter().map(|s| Vec3::from(s.map(f64::from)));
+        PatchMetric::of_log_stretch(wide.collect())
+    });
+    Ok(SampledGrid {
+        grid,
+        normal,
+        cells,
+        base: filled.pop(),
+        metric,
+        milliseconds: milliseconds(started),
+    })
 }
 
 fn grid_report(sampled: &SampledGrid, rim_uv: &[Vec2]) -> v1::GridReport {
@@ -304,7 +331,6 @@ fn may_shrink(error: &MendError) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use darn_geometry::mesh::Vec3;
     use darn_geometry::mesh::shapes::{jitter, sheet};
 
     #[test]

@@ -15,6 +15,7 @@ mod uv_square;
 
 pub use chart::Chart;
 pub use error::FlattenError;
+pub(crate) use raster::cell_faces;
 pub use raster::raster;
 pub(crate) use rest_triangle::RestTriangle;
 pub use uv_square::UvSquare;

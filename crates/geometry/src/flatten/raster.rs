@@ -2,7 +2,7 @@
 //! cells stay unknown.
 
 use super::chart::Chart;
-use crate::grid::{Grid, SIDE, cell_index};
+use crate::grid::{CELLS, Grid, SIDE, cell_index};
 use crate::mesh::{TriMesh, Vec2};
 
 /// Samples the positions of a mesh, scene space, at the centres of the cells that its faces cover in `chart`.
@@ -10,7 +10,29 @@ use crate::mesh::{TriMesh, Vec2};
 /// Where faces overlap in the chart, the face of lower index counts.
 pub fn raster(mesh: &TriMesh, chart: &Chart) -> Grid {
     let mut grid = Grid::unknown();
-    for face in &mesh.faces {
+    cover(mesh, chart, |cell, face, weights| {
+        if !grid.known[cell] {
+            let corners = mesh.faces[face].map(|v| mesh.positions[v as usize]);
+            grid.positions[cell] =
+                corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
+            grid.known[cell] = true;
+        }
+    });
+    grid
+}
+
+/// Per cell the face that its centre lies on; where faces overlap in the chart, the one of lowest index.
+pub(crate) fn cell_faces(mesh: &TriMesh, chart: &Chart) -> Vec<Option<usize>> {
+    let mut faces = vec![None; CELLS];
+    cover(mesh, chart, |cell, face, _| {
+        faces[cell].get_or_insert(face);
+    });
+    faces
+}
+
+/// Calls `covers` with every cell whose centre lies on a face, that face, in order of index, and the centre's barycentric weights.
+fn cover(mesh: &TriMesh, chart: &Chart, mut covers: impl FnMut(usize, usize, [f64; 3])) {
+    for (index, face) in mesh.faces.iter().enumerate() {
         let uv = face.map(|v| chart.uv(v) * SIDE as f64 - Vec2::repeat(0.5));
         let area = (uv[1] - uv[0]).perp(&(uv[2] - uv[0]));
         if area <= 0.0 {
@@ -23,17 +45,12 @@ pub fn raster(mesh: &TriMesh, chart: &Chart) -> Grid {
                 let p = Vec2::new(i as f64, j as f64);
                 let weights =
                     [1, 2, 0].map(|k: usize| (uv[(k + 1) % 3] - uv[k]).perp(&(p - uv[k])) / area);
-                let cell = cell_index(i, j);
-                if !grid.known[cell] && weights.iter().all(|w| *w >= -1e-9) {
-                    let corners = face.map(|v| mesh.positions[v as usize]);
-                    grid.positions[cell] =
-                        corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
-                    grid.known[cell] = true;
+                if weights.iter().all(|w| *w >= -1e-9) {
+                    covers(cell_index(i, j), index, weights);
                 }
             }
         }
     }
-    grid
 }
 
 /// Cells along one axis whose centres lie between two cell coordinates.

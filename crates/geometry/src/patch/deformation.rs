@@ -13,18 +13,32 @@ pub(super) struct StrainTriangle {
     pub gradient: [Vec2; 3],
     /// Area at rest, scene units squared.
     pub area: f64,
+    /// How far the rest shape is stretched from the chart, in doubt by as much: 0 where cloth lies flat.
+    pub doubt: f64,
 }
 
 // Inlined: these run for every triangle in every round.
 impl StrainTriangle {
     /// The triangle with the given vertices; `points` are the rest positions of all vertices.
     pub fn new(face: &[u32; 3], points: &[Vec2]) -> StrainTriangle {
-        let rest = RestTriangle::from_corners(face.map(|v| points[v as usize]));
+        Self::stretched(face, points, &Matrix2::identity())
+    }
+
+    /// The same with a rest shape that is stretched in the plane by a symmetric matrix.
+    pub fn stretched(face: &[u32; 3], points: &[Vec2], by: &Matrix2<f64>) -> StrainTriangle {
+        let rest = RestTriangle::from_corners(face.map(|v| by * points[v as usize]));
         StrainTriangle {
             face: *face,
             gradient: rest.gradients(),
             area: rest.area,
+            doubt: (by - Matrix2::identity()).norm(),
         }
+    }
+
+    /// The logarithm of the stretch from rest to `positions`, a symmetric matrix.
+    pub fn log_stretch(&self, positions: &[Vec3]) -> Matrix2<f64> {
+        let f = self.deformation(positions);
+        of_symmetric(f.transpose() * f, |square| 0.5 * square.max(1e-12).ln())
     }
 
     /// The deformation gradient F: its columns are the images of the chart's axes.
@@ -39,21 +53,22 @@ impl StrainTriangle {
         ])
     }
 
-    /// The deformation gradient with its singular values clamped to 1 ± `max_strain`.
+    /// The deformation gradient with its singular values clamped to 1 ± (`max_strain` + doubt).
     #[inline]
     pub fn limited(&self, positions: &[Vec3], max_strain: f64) -> Matrix3x2<f64> {
         let f = self.deformation(positions);
+        let max_strain = max_strain + self.doubt;
         let limited = |square: f64| {
             let s = square.max(1e-12).sqrt();
             s.clamp(1.0 - max_strain, 1.0 + max_strain) / s
         };
-        f * spectral(f.transpose() * f, limited)
+        f * of_symmetric(f.transpose() * f, limited)
     }
 
     /// The stretch S of the polar decomposition F = R S.
     pub fn stretch(&self, positions: &[Vec3]) -> Matrix2<f64> {
         let f = self.deformation(positions);
-        spectral(f.transpose() * f, |square| square.max(0.0).sqrt())
+        of_symmetric(f.transpose() * f, |square| square.max(0.0).sqrt())
     }
 
     /// The deformation R S nearest to the present one, for the given S and any rotation R.
@@ -61,18 +76,18 @@ impl StrainTriangle {
     pub fn rotated(&self, positions: &[Vec3], stretch: &Matrix2<f64>) -> Matrix3x2<f64> {
         let along = self.deformation(positions) * stretch;
         let inverse_root = |square: f64| square.max(1e-24).sqrt().recip();
-        along * spectral(along.transpose() * along, inverse_root) * stretch
+        along * of_symmetric(along.transpose() * along, inverse_root) * stretch
     }
 }
 
 /// g(C) of a symmetric 2×2 matrix C by its eigenvalues.
 #[inline]
-fn spectral(c: Matrix2<f64>, g: impl Fn(f64) -> f64) -> Matrix2<f64> {
+pub(super) fn of_symmetric(c: Matrix2<f64>, g: impl Fn(f64) -> f64) -> Matrix2<f64> {
     let (mean, half) = (0.5 * (c[(0, 0)] + c[(1, 1)]), 0.5 * (c[(0, 0)] - c[(1, 1)]));
     // Not `hypot`, which is slower: no value here is near overflow.
     let radius = (half * half + c[(0, 1)] * c[(0, 1)]).sqrt();
     let (high, low) = (g(mean + radius), g(mean - radius));
-    if radius <= 1e-12 * mean {
+    if radius <= 1e-12 * mean.abs() {
         return Matrix2::identity() * high;
     }
     // g(C) = ½(g₊ + g₋) I + ½(g₊ − g₋) (C − mean I) / radius

@@ -16,7 +16,8 @@ use crate::mesh::Vec3;
 /// triangles at its rim.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StrainOptions {
-    /// The singular values of a triangle's deformation cost nothing within 1 ± this.
+    /// The singular values of a triangle's deformation cost nothing within 1 ± this; where the patch's metric is stretched from the chart, within as
+    /// much more.
     pub max_strain: f64,
     /// Bends of a radius well above this cost less than strain.
     pub bending_length: f64,
@@ -86,9 +87,12 @@ impl StrainEnergy {
         options: &StrainOptions,
         budget: &Budget,
     ) -> Result<StrainEnergy, SolveError> {
-        let triangles: Vec<StrainTriangle> = (rest.faces.iter())
-            .map(|f| StrainTriangle::new(f, rest.points))
-            .collect();
+        let triangle = |(k, face)| match rest.stretches.get(k) {
+            Some(by) => StrainTriangle::stretched(face, rest.points, by),
+            None => StrainTriangle::new(face, rest.points),
+        };
+        let triangles: Vec<StrainTriangle> =
+            (rest.faces.iter().enumerate()).map(triangle).collect();
         let mean_edge = rest.mean_edge();
         let areas: Vec<f64> = triangles.iter().map(|t| t.area).collect();
         let mut bends = bending_terms(rest, &areas);

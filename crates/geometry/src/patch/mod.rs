@@ -16,6 +16,7 @@ mod energy;
 mod forces;
 mod harmonic;
 mod intersections;
+mod metric;
 mod plan;
 mod pull;
 pub mod quality;
@@ -28,7 +29,8 @@ mod triangulate;
 mod untangle;
 
 pub use energy::StrainOptions;
-pub use plan::{PatchPlan, plan, plan_in, stretch_limit};
+pub use metric::{PatchMetric, log_stretch};
+pub use plan::{PatchMesh, PatchPlan, plan, stretch_limit};
 pub use pull::{Firmness, Pull};
 pub use triangulate::signed_area;
 

@@ -13,6 +13,7 @@ use darn_budget::{Budget, Exhausted};
 use super::collisions::CollisionMesh;
 use super::energy::StrainEnergy;
 use super::harmonic::HarmonicExtension;
+use super::metric::PatchMetric;
 use super::pull::Pull;
 use super::rim_join::RimJoin;
 use super::strain::Minimisation;
@@ -39,7 +40,16 @@ pub struct PatchPlan {
     collisions: CollisionMesh,
 }
 
-/// Plans the patch of a region's hole when the region is all that is known of the scan.
+/// The triangles of a patch in the plane of the chart: what a plan starts from.
+pub struct PatchMesh {
+    /// Region vertices of the rim, counter-clockwise around the patch.
+    rim: Vec<u32>,
+    triangulation: Triangulation,
+    /// From the rim to all vertices.
+    rim_extension: HarmonicExtension,
+}
+
+/// Plans the patch of a region's hole when the region is all that is known of the scan, with the lengths of the chart.
 ///
 /// # Errors
 /// `RimCrosses` when the rim overlaps itself in the plane, `Singular` when triangles are degenerate; `Exhausted`.
@@ -48,28 +58,92 @@ pub fn plan<'a>(
     chart: &Chart,
     work: impl Into<PatchWork<'a>>,
 ) -> Result<PatchPlan, PatchError> {
+    let work = work.into();
     let rim = reversed_rim(region);
     let rim_points = RimPoints::new(&positions_of(&rim, &region.mesh), &region.mesh);
-    plan_rim(rim, rim_points, region, chart, work.into())
+    PatchMesh::new(rim, rim_points, region, chart, work)?.plan(region, chart, None, work)
 }
 
-/// Plans the patch of a region's hole in the whole scan. The region's positions may differ from the scan's (when it was
-/// denoised), and parts of the scan beyond the region may touch the rim.
-///
-/// # Errors
-/// `RimCrosses` when the rim overlaps itself in the plane, `Singular` when triangles are degenerate; `Exhausted`.
-pub fn plan_in<'a>(
-    scan: &TriMesh,
-    region: &Region,
-    chart: &Chart,
-    work: impl Into<PatchWork<'a>>,
-) -> Result<PatchPlan, PatchError> {
-    let rim = reversed_rim(region);
-    let scanned: Vec<u32> = (rim.iter())
-        .map(|v| region.vertices[*v as usize].0)
-        .collect();
-    let rim_points = RimPoints::new(&positions_of(&scanned, scan), scan);
-    plan_rim(rim, rim_points, region, chart, work.into())
+impl PatchMesh {
+    /// The triangles in a region's hole, in the whole scan. The region's positions may differ from the scan's (when it was denoised), and parts of
+    /// the scan beyond the region may touch the rim.
+    ///
+    /// # Errors
+    /// `RimCrosses` when the rim overlaps itself in the plane, `Singular` when triangles are degenerate; `Exhausted`.
+    pub fn in_scan<'a>(
+        scan: &TriMesh,
+        region: &Region,
+        chart: &Chart,
+        work: impl Into<PatchWork<'a>>,
+    ) -> Result<PatchMesh, PatchError> {
+        let rim = reversed_rim(region);
+        let scanned: Vec<u32> = (rim.iter())
+            .map(|v| region.vertices[*v as usize].0)
+            .collect();
+        let rim_points = RimPoints::new(&positions_of(&scanned, scan), scan);
+        PatchMesh::new(rim, rim_points, region, chart, work.into())
+    }
+
+    fn new(
+        rim: Vec<u32>,
+        rim_points: RimPoints,
+        region: &Region,
+        chart: &Chart,
+        work: PatchWork,
+    ) -> Result<PatchMesh, PatchError> {
+        let PatchWork { options, budget } = work;
+        let flat: Vec<Vec2> = rim.iter().map(|v| chart.flat[*v as usize]).collect();
+        let asked = Asked {
+            spacing: spacing(region, chart),
+            max_points: options.max_vertices,
+            budget,
+        };
+        let triangulation = triangulate_pieces(flat, rim_points, &asked)?;
+        let held: Vec<u32> = (0..rim.len() as u32).collect();
+        let rim_extension =
+            HarmonicExtension::new(&triangulation.points, &triangulation.faces, &held, budget)
+                .map_err(PatchError::of_stage("seam"))?;
+        Ok(PatchMesh {
+            rim,
+            triangulation,
+            rim_extension,
+        })
+    }
+
+    /// The plan of a patch of these triangles, with the lengths of a metric; without one, with those of the chart.
+    ///
+    /// # Errors
+    /// `Singular` when triangles are degenerate; `Exhausted`.
+    pub fn plan<'a>(
+        self,
+        region: &Region,
+        chart: &Chart,
+        metric: Option<&PatchMetric>,
+        work: impl Into<PatchWork<'a>>,
+    ) -> Result<PatchPlan, PatchError> {
+        let PatchWork { options, budget } = work.into();
+        let PatchMesh {
+            rim,
+            triangulation,
+            rim_extension,
+        } = self;
+        let mut join = RimJoin::new(&rim, &triangulation, region, chart);
+        if let Some(metric) = metric {
+            join = join.with_metric(metric, chart);
+        }
+        let energy = StrainEnergy::new(&join.rest(), &options.strain, budget)
+            .map_err(PatchError::of_stage("strain"))?;
+        Ok(PatchPlan {
+            rim_positions: positions_of(&rim, &region.mesh),
+            collisions: CollisionMesh::new(&rim, &triangulation, region),
+            rim,
+            shift: None,
+            triangulation,
+            rim_extension,
+            join,
+            energy,
+        })
+    }
 }
 
 /// The rim of a region has the scan on its left and the hole on its right; reversed it runs counter-clockwise around
@@ -81,44 +155,6 @@ fn reversed_rim(region: &Region) -> Vec<u32> {
 fn positions_of(vertices: &[u32], mesh: &TriMesh) -> Vec<Vec3> {
     let position = |v: &u32| mesh.positions[*v as usize];
     vertices.iter().map(position).collect()
-}
-
-fn plan_rim(
-    rim: Vec<u32>,
-    rim_points: RimPoints,
-    region: &Region,
-    chart: &Chart,
-    work: PatchWork,
-) -> Result<PatchPlan, PatchError> {
-    let PatchWork { options, budget } = work;
-    let flat: Vec<Vec2> = rim.iter().map(|v| chart.flat[*v as usize]).collect();
-    let spacing = spacing(region, chart);
-    let asked = Asked {
-        spacing,
-        max_points: options.max_vertices,
-        budget,
-    };
-    let triangulation = triangulate_pieces(flat, rim_points, &asked)?;
-
-    let rim_positions = positions_of(&rim, &region.mesh);
-    let held: Vec<u32> = (0..rim.len() as u32).collect();
-    let rim_extension =
-        HarmonicExtension::new(&triangulation.points, &triangulation.faces, &held, budget)
-            .map_err(PatchError::of_stage("seam"))?;
-    let join = RimJoin::new(&rim, &triangulation, region, chart);
-    let energy = StrainEnergy::new(&join.rest(), &options.strain, budget)
-        .map_err(PatchError::of_stage("strain"))?;
-    let collisions = CollisionMesh::new(&rim, &triangulation, region);
-    Ok(PatchPlan {
-        rim,
-        rim_positions,
-        shift: None,
-        triangulation,
-        rim_extension,
-        join,
-        energy,
-        collisions,
-    })
 }
 
 impl PatchPlan {

@@ -1,5 +1,7 @@
 //! The shape without strain that the energy compares with: triangles in the plane of the chart.
 
+use nalgebra::Matrix2;
+
 use crate::mesh::Vec2;
 
 /// Triangles at rest in the plane of the chart; the first `free` vertices may move, the others are held.
@@ -11,6 +13,8 @@ pub(super) struct RestMesh<'a> {
     pub faces: &'a [[u32; 3]],
     /// How many vertices, the first ones, may move.
     pub free: usize,
+    /// How far the first triangles are stretched from the chart at rest; the others have the chart's lengths.
+    pub stretches: &'a [Matrix2<f64>],
 }
 
 impl RestMesh<'_> {

@@ -1,5 +1,8 @@
 //! The patch joined with the scan triangles at its rim; strain limiting moves the patch and holds the scan.
 
+use nalgebra::Matrix2;
+
+use super::metric::PatchMetric;
 use super::rest::RestMesh;
 use super::triangulate::Triangulation;
 use crate::flatten::Chart;
@@ -19,6 +22,8 @@ pub(super) struct RimJoin {
     held: Vec<Vec3>,
     /// Vertices of the rim.
     corners: usize,
+    /// How far each triangle of the patch is stretched from the chart at rest; empty where none is.
+    stretches: Vec<Matrix2<f64>>,
 }
 
 impl RimJoin {
@@ -63,7 +68,22 @@ impl RimJoin {
             free,
             held,
             corners,
+            stretches: Vec::new(),
         }
+    }
+
+    /// The same with the lengths of a metric in the hole.
+    pub fn with_metric(mut self, metric: &PatchMetric, chart: &Chart) -> RimJoin {
+        let patch = self
+            .faces
+            .iter()
+            .take_while(|f| f.iter().all(|v| (*v as usize) < self.free + self.corners));
+        let stretch = |f: &[u32; 3]| {
+            let centre = f.iter().map(|v| self.points[*v as usize]).sum::<Vec2>() / 3.0;
+            metric.stretch(chart.frame.uv(centre))
+        };
+        self.stretches = patch.map(stretch).collect();
+        self
     }
 
     /// All triangles at rest.
@@ -72,6 +92,7 @@ impl RimJoin {
             points: &self.points,
             faces: &self.faces,
             free: self.free,
+            stretches: &self.stretches,
         }
     }
 
@@ -88,7 +109,10 @@ impl RimJoin {
 
     /// Bytes of memory held.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.points[..]) + size_of_val(&self.faces[..]) + size_of_val(&self.held[..])
+        size_of_val(&self.points[..])
+            + size_of_val(&self.faces[..])
+            + size_of_val(&self.held[..])
+            + size_of_val(&self.stretches[..])
     }
 }
 

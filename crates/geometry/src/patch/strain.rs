@@ -126,6 +126,7 @@ mod tests {
             points: &rest,
             faces: &faces,
             free,
+            stretches: &[],
         };
         minimise(&rest_mesh, &mut positions, options);
         for face in &faces {
@@ -147,6 +148,7 @@ mod tests {
             points: &rest,
             faces: &faces,
             free,
+            stretches: &[],
         };
         minimise(&rest_mesh, &mut positions, options);
         for (p, q) in positions.iter().zip(&before) {
