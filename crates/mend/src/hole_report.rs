@@ -63,7 +63,7 @@ impl<'a> PatchDraft<'a> {
         let mut notes = notes(hole, &quality);
         if network_share < MOSTLY_FAIR {
             notes.push(format!(
-                "the network's folds do not fit the cloth around the hole; it was filled with {:.0} % of them, the rest is a smooth surface",
+                "the network's folds do not fit the cloth around the hole: it was filled with a smooth surface and {:.0} % of them",
                 100.0 * network_share
             ));
         }
