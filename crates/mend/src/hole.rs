@@ -119,22 +119,7 @@ impl Hole {
 
     fn fill(&self, inpainter: &Inpainter, call: Call) -> Result<UneditedCloth, MendError> {
         let started = Instant::now();
-        call.budget.spend(FILL_WORK)?;
-        let grid = self.normal_grid();
-        let widened = WidenedHole::new(self);
-        let (answers, network_share) = rayon::join(
-            || inpainter.fill(std::slice::from_ref(&grid), Averaging::Flips),
-            || widened.network_share(inpainter, call.budget),
-        );
-        let (answers, network_share) = (answers?, network_share?);
-        let mut answer = answers.into_iter().next().unwrap_or_default();
-        if network_share < 1.0
-            && let Some(fair) = widened.fair_fill(call.budget)?
-        {
-            for (network, fair) in answer.iter_mut().zip(&fair) {
-                (0..3).for_each(|d| network[d] = fair[d] + network_share * (network[d] - fair[d]));
-            }
-        }
+        let (answer, network_share) = self.answer(inpainter, call)?;
         let predicted = self.in_scene(&answer);
         let net_ms = milliseconds(started);
         let started = Instant::now();
@@ -153,6 +138,32 @@ impl Hole {
             net_ms,
             patch_ms: milliseconds(started),
         })
+    }
+
+    /// The fill of all cells in the network's units, and the share of the network's movement in it.
+    fn answer(&self, inpainter: &Inpainter, call: Call) -> Result<(Vec<[f32; 3]>, f32), MendError> {
+        let widened = WidenedHole::new(self, call.budget)?;
+        if widened.is_smooth()
+            && let Some(fair) = widened.fair_fill(call.budget)?
+        {
+            return Ok((fair, 0.0));
+        }
+        call.budget.spend(FILL_WORK)?;
+        let grid = self.normal_grid();
+        let (answers, network_share) = rayon::join(
+            || inpainter.fill(std::slice::from_ref(&grid), Averaging::Flips),
+            || widened.network_share(inpainter, call.budget),
+        );
+        let (answers, network_share) = (answers?, network_share?);
+        let mut answer = answers.into_iter().next().unwrap_or_default();
+        if network_share < 1.0
+            && let Some(fair) = widened.fair_fill(call.budget)?
+        {
+            for (network, fair) in answer.iter_mut().zip(&fair) {
+                (0..3).for_each(|d| network[d] = fair[d] + network_share * (network[d] - fair[d]));
+            }
+        }
+        Ok((answer, network_share))
     }
 
     /// A network's answer for all cells, in scene space.

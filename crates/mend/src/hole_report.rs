@@ -21,8 +21,6 @@ const SUSPICIOUS: f64 = 1.5;
 /// A loose piece lies in the hole when all of its border is nearer to the patch than this many edges of the hole's rim.
 const IN_THE_HOLE: f64 = 1.5;
 
-/// A note is written when less than this share of the network's folds was kept.
-const MOSTLY_FAIR: f32 = 0.5;
 /// Most loose pieces that a note names.
 const MAX_NAMED: usize = 20;
 /// Nanoseconds of work a search for the nearest vertex of a patch.
@@ -61,12 +59,6 @@ impl<'a> PatchDraft<'a> {
         let quality = quality::measure(&patch, &hole.region);
         timings.report = milliseconds(started);
         let mut notes = notes(hole, &quality);
-        if network_share < MOSTLY_FAIR {
-            notes.push(format!(
-                "the network's folds do not fit the cloth around the hole: it was filled with a smooth surface and {:.0} % of them",
-                100.0 * network_share
-            ));
-        }
         notes.extend(loose_pieces_note(hole, &patch, welded, budget)?);
         notes.extend(constraints.notes(&kept.anchors));
         let rim = &welded.loops[hole.id as usize];

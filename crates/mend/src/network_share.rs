@@ -20,33 +20,57 @@ const WIDER: usize = 4;
 const WORTHLESS: f64 = 0.2;
 /// The fitting share from which on all of it is kept.
 const WORTH_ALL: f64 = 0.6;
-/// Nanoseconds of work of a plate and a pass of the network.
-const SHARE_WORK: u64 = 10_000_000;
-/// Nanoseconds of work of four fills of the grid.
-const FAIR_WORK: u64 = 20_000_000;
+/// Cells that a plate may be off around a hole (root mean square) where no network is needed. On draped sheets it is off by 0.15 and more.
+const SMOOTH: f64 = 0.06;
+/// Cells by which two fair surfaces may differ (root mean square) without it mattering which is taken.
+const ALIKE: f64 = 0.02;
+/// Side of a cell, network's units.
+const CELL: f64 = 1.0 / SIDE as f64;
+/// Nanoseconds of work of a plate.
+const PLATE_WORK: u64 = 4_000_000;
+/// Nanoseconds of work of a pass of the network.
+const PASS_WORK: u64 = 5_000_000;
+/// Nanoseconds of work of the fair fills.
+const FAIR_WORK: u64 = 15_000_000;
 
-/// A hole widened by cells that the scan shows: what a method says about them can be compared with the truth.
+/// A hole widened by cells that the scan shows: what a method says about them can be compared with the truth. Lengths are in the network's units.
 pub struct WidenedHole<'a> {
     hole: &'a Hole,
-    scan: NormalGrid,
     /// The cells that the hole was widened by, ascending.
     tested: Vec<usize>,
     /// Whether a cell is known and not tested.
     known: Vec<bool>,
+    /// The plate over the widened hole; `None` where too few cells are known.
+    plate: Option<Vec<Vec3>>,
 }
 
 impl<'a> WidenedHole<'a> {
-    /// Widens a hole.
-    pub fn new(hole: &'a Hole) -> WidenedHole<'a> {
+    /// Widens a hole and lays a plate over it.
+    ///
+    /// # Errors
+    /// `Exhausted`.
+    pub fn new(hole: &'a Hole, budget: &Budget) -> Result<WidenedHole<'a>, MendError> {
+        budget.spend(PLATE_WORK)?;
         let tested = around(hole);
         let mut known = hole.grid.known.clone();
         tested.iter().for_each(|k| known[*k] = false);
-        WidenedHole {
+        let mut widened = WidenedHole {
             hole,
-            scan: hole.normal_grid(),
             tested,
             known,
-        }
+            plate: None,
+        };
+        widened.plate = widened.filled(&widened.known, Smooth::TautPlate);
+        Ok(widened)
+    }
+
+    /// Whether the plate is so right about the tested cells that no network is needed.
+    pub fn is_smooth(&self) -> bool {
+        self.plate.as_ref().is_some_and(|plate| {
+            let off = self.tested.iter().map(|k| plate[*k] - self.scanned(*k));
+            let square: f64 = off.map(|off| off.norm_squared()).sum();
+            square <= (SMOOTH * CELL).powi(2) * self.tested.len() as f64
+        })
     }
 
     /// The share, 0 to 1, of the network's movement from the plate that is worth keeping in the hole; 1 where that cannot be found out.
@@ -54,62 +78,85 @@ impl<'a> WidenedHole<'a> {
     /// # Errors
     /// A failure of the network; `Exhausted`.
     pub fn network_share(&self, inpainter: &Inpainter, budget: &Budget) -> Result<f32, MendError> {
-        budget.spend(SHARE_WORK)?;
-        let Some(plate) = darn_net::plate(&self.scan.positions, &self.known) else {
+        let (Some(plate), Some(base)) = (&self.plate, &self.hole.base) else {
             return Ok(1.0);
         };
+        budget.spend(PASS_WORK)?;
+        // Beyond the cloth nothing depends on how far the hole was widened.
+        let plate_or_base = |k: usize| match self.hole.grid.known[k] || self.hole.cells.contains(k)
+        {
+            true => plate[k].cast::<f32>().into(),
+            false => base[k],
+        };
         let position = |k: usize| match self.known[k] {
-            true => self.scan.positions[k],
+            true => self.scanned(k).cast::<f32>().into(),
             false => [0.0; 3],
         };
         let widened = NormalGrid {
             positions: (0..CELLS).map(position).collect(),
             known: self.known.iter().map(|k| f32::from(u8::from(*k))).collect(),
-            base: Some(plate.clone()),
+            base: Some((0..CELLS).map(plate_or_base).collect()),
         };
         let answers = inpainter.fill(std::slice::from_ref(&widened), Averaging::Once)?;
         let share = answers.first().and_then(|answer| {
-            self.fitting_share(
-                |k| Vec3::from(plate[k].map(f64::from)),
-                |k| Vec3::from(answer[k].map(f64::from)),
-            )
+            let answer = |k: usize| Vec3::from(answer[k].map(f64::from));
+            self.fitting_share(|k| plate[k], answer)
         });
         Ok(share.map_or(1.0, kept) as f32)
     }
 
-    /// A fair fill of the grid in the network's units, for cloth whose folds the network does not know: a thin plate, and as much of a surface of
-    /// minimum variation as is right about the tested cells. Noise at the rim misleads the latter. `None` when too few cells are known.
+    /// A fair fill of the grid, for cloth whose folds the network does not know: a thin plate, and as much of a surface of minimum variation as is right
+    /// about the tested cells; noise at the rim misleads the latter. `None` when too few cells are known.
     ///
     /// # Errors
     /// `Exhausted`.
     pub fn fair_fill(&self, budget: &Budget) -> Result<Option<Vec<[f32; 3]>>, MendError> {
         budget.spend(FAIR_WORK)?;
-        let fill = |known: &[bool], energy: Smooth| {
-            let open: Vec<bool> = known.iter().map(|k| !k).collect();
-            smooth(&self.hole.grid.positions, known, &open, energy)
-        };
         let both = |known: &[bool]| {
             let (thin, least) = rayon::join(
-                || fill(known, Smooth::ThinPlate),
-                || fill(known, Smooth::MinimumVariation),
+                || self.filled(known, Smooth::ThinPlate),
+                || self.filled(known, Smooth::MinimumVariation),
             );
             thin.zip(least)
         };
-        let (tested, filled) = rayon::join(|| both(&self.known), || both(&self.hole.grid.known));
-        let Some((thin, least)) = filled else {
+        let Some((thin, least)) = both(&self.hole.grid.known) else {
             return Ok(None);
         };
-        let to_network = |p: &Vec3| Vec3::from(self.hole.normal.to_network(p).map(f64::from));
-        let share = tested.and_then(|(thin, least)| {
-            self.fitting_share(|k| to_network(&thin[k]), |k| to_network(&least[k]))
-        });
-        let share = share.unwrap_or(0.0).clamp(0.0, 1.0);
-        let each = thin.iter().zip(&least);
-        let mixed = each.map(|(thin, least)| self.hole.normal.to_network(&thin.lerp(least, share)));
-        Ok(Some(mixed.collect()))
+        let cells = self.hole.cells.indices();
+        let square: f64 = (cells.iter().map(|k| (least[*k] - thin[*k]).norm_squared())).sum();
+        let share = if square <= (ALIKE * CELL).powi(2) * cells.len() as f64 {
+            0.0
+        } else {
+            let tested = both(&self.known);
+            let share =
+                tested.and_then(|(thin, least)| self.fitting_share(|k| thin[k], |k| least[k]));
+            share.unwrap_or(0.0).clamp(0.0, 1.0)
+        };
+        let fair = |k: usize| match (self.hole.cells.contains(k), &self.hole.base) {
+            (false, Some(base)) => base[k],
+            _ => thin[k].lerp(&least[k], share).cast::<f32>().into(),
+        };
+        Ok(Some((0..CELLS).map(fair).collect()))
     }
 
-    /// The share of a movement of cells that brings the tested ones nearest to the scan (least squares); `None` when nothing moves. Network's units.
+    /// The grid with its hole filled so that an energy is least, where the other cells that are not `known` are part of the hole. Beyond the cloth it
+    /// stays unknown: that keeps the system small.
+    fn filled(&self, known: &[bool], energy: Smooth) -> Option<Vec<Vec3>> {
+        let grid = &self.hole.grid;
+        let open: Vec<bool> = (0..CELLS)
+            .map(|k| self.hole.cells.contains(k) || (grid.known[k] && !known[k]))
+            .collect();
+        let scanned: Vec<Vec3> = (0..CELLS).map(|k| self.scanned(k)).collect();
+        smooth(&scanned, known, &open, energy)
+    }
+
+    /// The scan's position at a cell; meaningless where it is not known.
+    fn scanned(&self, cell: usize) -> Vec3 {
+        let normal = &self.hole.normal;
+        (self.hole.grid.positions[cell] - normal.centre) / normal.scale
+    }
+
+    /// The share of a movement of cells that brings the tested ones nearest to the scan (least squares); `None` when nothing moves.
     fn fitting_share(
         &self,
         from: impl Fn(usize) -> Vec3,
@@ -118,7 +165,7 @@ impl<'a> WidenedHole<'a> {
         let (mut along, mut square) = (0.0, 0.0);
         for &k in &self.tested {
             let movement = to(k) - from(k);
-            let wanted = Vec3::from(self.scan.positions[k].map(f64::from)) - from(k);
+            let wanted = self.scanned(k) - from(k);
             along += movement.dot(&wanted);
             square += movement.norm_squared();
         }
