@@ -69,7 +69,7 @@ impl<'a> WidenedHole<'a> {
         self.plate.as_ref().is_some_and(|plate| {
             let off = self.tested.iter().map(|k| plate[*k] - self.scanned(*k));
             let square: f64 = off.map(|off| off.norm_squared()).sum();
-            square <= (SMOOTH * CELL).powi(2) * self.tested.len() as f64
+            !self.tested.is_empty() && square <= (SMOOTH * CELL).powi(2) * self.tested.len() as f64
         })
     }
 
