@@ -129,7 +129,7 @@ impl PatchMesh {
         } = self;
         let mut join = RimJoin::new(&rim, &triangulation, region, chart);
         if let Some(metric) = metric {
-            join = join.with_metric(metric, chart);
+            join = join.with_metric(metric, &triangulation, chart);
         }
         let energy = StrainEnergy::new(&join.rest(), &options.strain, budget)
             .map_err(PatchError::of_stage("strain"))?;

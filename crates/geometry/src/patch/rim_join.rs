@@ -72,17 +72,18 @@ impl RimJoin {
         }
     }
 
-    /// The same with the lengths of a metric in the hole.
-    pub fn with_metric(mut self, metric: &PatchMetric, chart: &Chart) -> RimJoin {
-        let patch = self
-            .faces
-            .iter()
-            .take_while(|f| f.iter().all(|v| (*v as usize) < self.free + self.corners));
+    /// The same with the lengths of a metric in the triangulated hole.
+    pub fn with_metric(
+        mut self,
+        metric: &PatchMetric,
+        triangulation: &Triangulation,
+        chart: &Chart,
+    ) -> RimJoin {
         let stretch = |f: &[u32; 3]| {
-            let centre = f.iter().map(|v| self.points[*v as usize]).sum::<Vec2>() / 3.0;
-            metric.stretch(chart.frame.uv(centre))
+            let corners = f.iter().map(|v| triangulation.points[*v as usize]);
+            metric.stretch(chart.frame.uv(corners.sum::<Vec2>() / 3.0))
         };
-        self.stretches = patch.map(stretch).collect();
+        self.stretches = triangulation.faces.iter().map(stretch).collect();
         self
     }
 
