@@ -5,12 +5,12 @@ use std::time::Instant;
 use crate::constraints::HoleConstraints;
 use crate::context::HoleContext;
 use crate::error::MendError;
-use crate::hole::{Hole, patch_options};
+use crate::hole::Hole;
 use crate::select::HoleRequest;
 use crate::timings::milliseconds;
 use darn_contract::v1;
 use darn_geometry::mesh::Vec3;
-use darn_geometry::patch::{Patch, PatchWork, Pull, quality, stretch_limit};
+use darn_geometry::patch::{Patch, Pull, quality, stretch_limit};
 
 /// How often a smaller share of the network's movement is tried before the pulls alone move the unedited cloth.
 const MAX_TRIES: usize = 2;
@@ -70,22 +70,18 @@ impl<'a> HoleContext<'a> {
         let stretch = |patch: &Patch| quality::measure(patch, &hole.region).stretch_max;
         let usual = stretch(&unedited.patch);
         let most = stretch_limit(usual);
-        let options = patch_options(self.call, unedited.network_share);
-        let work = PatchWork {
-            options: &options,
-            budget: self.call.budget,
-        };
+        let patch = |filled: &[Vec3]| hole.patch(filled, pulls, unedited.network_share, self.call);
         let mut share = 1.0;
         for _ in 0..MAX_TRIES {
             let each = unedited.filled.iter().zip(moved);
             let filled: Vec<Vec3> = each.map(|(from, to)| from.lerp(to, share)).collect();
-            let patch = hole.patch(&filled, pulls, work)?;
-            let found = stretch(&patch);
+            let tried = patch(&filled)?;
+            let found = stretch(&tried);
             if found <= most {
-                return Ok(patch);
+                return Ok(tried);
             }
             share *= (most - usual) / (found - usual);
         }
-        hole.patch(&unedited.filled, pulls, work)
+        patch(&unedited.filled)
     }
 }

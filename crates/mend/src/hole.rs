@@ -14,7 +14,7 @@ use darn_geometry::flatten::Chart;
 use darn_geometry::grid::{self, CELLS, Grid, NormalGrid, Normalisation};
 use darn_geometry::mesh::region::Region;
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
-use darn_geometry::patch::{Patch, PatchOptions, PatchPlan, PatchWork, Pull};
+use darn_geometry::patch::{Patch, PatchPlan, PatchWork, Pull};
 use darn_geometry::polygon;
 use darn_net::Averaging;
 
@@ -124,12 +124,7 @@ impl Hole {
         let net_ms = milliseconds(started);
         let started = Instant::now();
         let filled = self.filled(&predicted);
-        let options = patch_options(call, network_share);
-        let work = PatchWork {
-            options: &options,
-            budget: call.budget,
-        };
-        let patch = self.patch(&filled, &[], work)?;
+        let patch = self.patch(&filled, &[], network_share, call)?;
         Ok(UneditedCloth {
             network_share,
             predicted,
@@ -181,7 +176,8 @@ impl Hole {
             .collect()
     }
 
-    /// Meshes a filled grid.
+    /// Meshes a filled grid that has this share of the network's movement. Fair cloth may be strained: in a hole without folds, nothing but the plate
+    /// says what area the cloth has.
     ///
     /// # Errors
     /// `Patch` when that is not possible.
@@ -189,8 +185,15 @@ impl Hole {
         &self,
         filled: &[Vec3],
         pulls: &[Pull],
-        work: PatchWork,
+        network_share: f32,
+        call: Call,
     ) -> Result<Patch, MendError> {
+        let mut options = call.mender.limits.patch;
+        options.strain.max_strain += f64::from(1.0 - network_share);
+        let work = PatchWork {
+            options: &options,
+            budget: call.budget,
+        };
         self.plan
             .patch(&self.chart, filled, pulls, work)
             .map_err(MendError::patch(self.id))
@@ -206,14 +209,6 @@ impl Hole {
         let grid = CELLS * (24 + 1 + 9 + 12);
         region + grid + self.plan.bytes() + self.unedited.bytes()
     }
-}
-
-/// How a patch is made where the network is trusted so far. Fair cloth may be strained: in a hole without folds, nothing but the plate says what area
-/// the cloth has.
-pub fn patch_options(call: Call, network_share: f32) -> PatchOptions {
-    let mut options = call.mender.limits.patch;
-    options.strain.max_strain += f64::from(1.0 - network_share);
-    options
 }
 
 impl UneditedCloths {

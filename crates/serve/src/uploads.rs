@@ -203,12 +203,12 @@ mod tests {
     #[test]
     fn many_addresses_leave_a_slot_for_one_more() {
         let uploads = Uploads::new(18, Sharing::ByAddress);
-        let slots = (0..6_u8).flat_map(|last| {
-            let all = std::iter::repeat_with(move || (BodySize::Small, client(last)));
-            all.map_while(|(size, client)| uploads.take(size, client).ok())
-                .collect::<Vec<_>>()
-        });
-        let slots: Vec<UploadSlot> = slots.collect();
+        let mut slots = Vec::new();
+        for last in 0..6 {
+            while let Ok(slot) = uploads.take(BodySize::Small, client(last)) {
+                slots.push(slot);
+            }
+        }
         assert!(slots.len() > 100);
         assert!(uploads.take(BodySize::Small, client(7)).is_ok());
     }
