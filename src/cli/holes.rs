@@ -64,6 +64,7 @@ fn line(rim: &Loop) -> String {
 pub fn kind_name(kind: LoopKind) -> &'static str {
     match kind {
         LoopKind::Hole => "hole",
+        LoopKind::Opening => "opening",
         LoopKind::OuterBoundary => "outer boundary",
         LoopKind::TubeEnd => "end of a tube",
         LoopKind::Unspecified => "unknown",

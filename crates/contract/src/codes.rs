@@ -172,6 +172,8 @@ codes! {
     RIM_CROSSES_ITSELF = "rim_crosses_itself", 422, FailedPrecondition;
     /// The patch would have degenerate triangles.
     PATCH_DEGENERATE = "patch_degenerate", 422, FailedPrecondition;
+    /// The patch is stretched or cuts itself beyond what cloth does.
+    NO_PLAUSIBLE_FILL = "no_plausible_fill", 422, FailedPrecondition;
     /// No cell of the grid lies in the hole.
     HOLE_TOO_NARROW = "hole_too_narrow", 422, FailedPrecondition;
 }

@@ -6,6 +6,7 @@
 pub mod codes;
 mod error_chain;
 mod json;
+mod outcome;
 pub mod port;
 mod validate;
 
@@ -13,7 +14,10 @@ pub use codes::{Code, GrpcCode};
 pub use darn_json::{EXCERPT_BYTES, cut, excerpt};
 pub use error_chain::error_chain;
 pub use json::{JsonError, from_json};
-pub use validate::{Anchor, Constraints, Edit, FieldError, Gesture, HoleSelector, Search};
+pub use outcome::Outcome;
+pub use validate::{
+    Anchor, Constraints, Diameters, Edit, FieldError, Fill, Gesture, HoleSelector, Search,
+};
 
 /// The messages of `proto/darn/v1/darn.proto`, as generated.
 #[allow(missing_docs, clippy::all, clippy::pedantic, rustdoc::all)]

@@ -45,6 +45,34 @@ pub struct Constraints {
     pub weights: Option<String>,
     /// Direction opposite to gravity in scene space; any length above zero.
     pub up: Option<[f64; 3]>,
+    /// Which loops are filled beside those that `holes` names; `None`: holes, or none beside the named ones.
+    pub fill: Option<Fill>,
+    /// Unnamed loops outside these diameters are left.
+    pub diameters: Diameters,
+    /// Ids of loops to leave (entry `i` is `/except/i`).
+    pub except: Vec<u32>,
+    /// Whether patches that are no plausible cloth are applied.
+    pub accept_doubtful: bool,
+}
+
+/// Kinds of loops to fill. None of them includes outer boundaries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fill {
+    /// Damage.
+    Holes,
+    /// Finished openings and the ends of tubes.
+    Openings,
+    /// Both.
+    All,
+}
+
+/// A range of loop diameters, both ends included, in the scene's unit. The default has no ends.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Diameters {
+    /// The least.
+    pub min: Option<f64>,
+    /// The largest.
+    pub max: Option<f64>,
 }
 
 /// Selects one hole.
@@ -133,6 +161,7 @@ impl Constraints {
         errors.count("/holes", message.holes.len());
         errors.count("/anchors", message.anchors.len());
         errors.count("/edits", message.edits.len());
+        errors.count("/except", message.except.len());
         if !errors.0.is_empty() {
             return Err(errors.0);
         }
@@ -151,6 +180,19 @@ impl Constraints {
             up => errors.direction("/up", up),
         };
         errors.name("/weights", message.weights.as_deref());
+        let fill = (message.fill.as_deref()).and_then(|fill| errors.fill(fill));
+        let diameters = Diameters {
+            max: errors.diameter("/maxDiameter", message.max_diameter),
+            min: errors.diameter("/minDiameter", message.min_diameter),
+        };
+        if let Diameters {
+            min: Some(min),
+            max: Some(max),
+        } = diameters
+            && min > max
+        {
+            errors.push("/minDiameter", format!("{min} is above maxDiameter, {max}"));
+        }
         if errors.0.is_empty() {
             Ok(Self {
                 holes,
@@ -158,6 +200,10 @@ impl Constraints {
                 edits,
                 weights: message.weights.clone(),
                 up,
+                fill,
+                diameters,
+                except: message.except.clone(),
+                accept_doubtful: message.accept_doubtful,
             })
         } else {
             Err(errors.0)
@@ -217,6 +263,31 @@ impl FieldErrors {
                 format!("a name of {length} bytes; the limit is {EXCERPT_BYTES}"),
             );
         }
+    }
+
+    fn fill(&mut self, fill: &str) -> Option<Fill> {
+        match fill {
+            "holes" => Some(Fill::Holes),
+            "openings" => Some(Fill::Openings),
+            "all" => Some(Fill::All),
+            other => {
+                let got = excerpt(other);
+                let detail = format!("expected `holes`, `openings` or `all`; got `{got}`");
+                self.push("/fill", detail);
+                None
+            }
+        }
+    }
+
+    fn diameter(&mut self, at: &str, diameter: Option<f64>) -> Option<f64> {
+        let diameter = diameter?;
+        let expected = "expected a diameter in the scene's unit, 0 to 1e18";
+        self.number(
+            at,
+            Some(diameter),
+            |x| (0.0..=MAX_COORDINATE).contains(&x),
+            expected,
+        )
     }
 
     fn hole(&mut self, at: &str, hole: &v1::HoleSelector) -> Option<HoleSelector> {
@@ -406,89 +477,5 @@ fn numbers(list: &pbjson_types::ListValue) -> Vec<f64> {
 }
 
 #[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-
-    use super::*;
-    use crate::from_json;
-
-    fn check(text: &str) -> Result<Constraints, Vec<String>> {
-        let message: v1::Constraints = from_json(text.as_bytes()).unwrap();
-        Constraints::check(&message)
-            .map_err(|errors| errors.into_iter().map(|e| e.pointer).collect())
-    }
-
-    #[test]
-    fn valid_constraints_pass() {
-        assert_eq!(check("{}"), Ok(Constraints::default()));
-        let asked = check(
-            r#"{"holes": [{"id": 0}, {"near": [1, 2, 3]}], "anchors": [{"uv": [0, 1], "position": [1, 2, 3]}]}"#,
-        );
-        assert_eq!(
-            asked,
-            Ok(Constraints {
-                holes: vec![HoleSelector::Id(0), HoleSelector::Near([1.0, 2.0, 3.0])],
-                anchors: vec![Anchor {
-                    hole: None,
-                    uv: Some([0.0, 1.0]),
-                    position: [1.0, 2.0, 3.0],
-                    hard: false
-                }],
-                ..Constraints::default()
-            })
-        );
-    }
-
-    #[test]
-    fn every_invalid_field_is_reported() {
-        let text = r#"{
-            "holes": [{}, {"id": 1, "near": [0, 0, 0]}, {"near": [0, 1]}, {"cut": {}}, {"near": ["NaN", 0, "Infinity"]}],
-            "anchors": [{"uv": [0.5, 1.5], "position": [0, 0, 0]}, {"position": [0, 0, 0], "hard": true}, {"uv": [0, 0, 0]}],
-            "edits": [{}, {"grab": {"uv": [2, 0], "offset": [0, 0, 0]}}, {"twist": {"uv": [0, 0], "radius": 0, "axis": [0, 1, 0], "angle": 1}},
-                      {"twist": {"uv": [0, 0], "radius": 0.1, "axis": [0, 0, 0], "angle": 1}}, {"pinch": {"uvs": [[0, 0], [0, "x"]], "amount": 1}},
-                      {"pinch": {"uvs": [[0, 0]]}}, {"pinch": {"uvs": [[0, 0], [1, 1]]}}],
-            "up": [1],
-            "weights": "NAME"
-        }"#;
-        let text = text.replace("NAME", &"n".repeat(257));
-        let expected = [
-            "/holes/0",
-            "/holes/1",
-            "/holes/2/near",
-            "/holes/3/cut",
-            "/holes/4/near/0",
-            "/holes/4/near/2",
-            "/anchors/0/uv/1",
-            "/anchors/2/uv",
-            "/anchors/2/position",
-            "/edits/0",
-            "/edits/1/grab/uv/0",
-            "/edits/2/twist/radius",
-            "/edits/3/twist/axis",
-            "/edits/4/pinch/uvs/1/1",
-            "/edits/5/pinch/uvs",
-            "/edits/5/pinch/amount",
-            "/edits/6/pinch/amount",
-            "/up",
-            "/weights",
-        ];
-        assert_eq!(check(&text).unwrap_err(), expected);
-    }
-
-    proptest! {
-        #[test]
-        fn values_that_pass_are_finite_and_in_range(
-            uv in prop::collection::vec(prop::num::f64::ANY, 0..4),
-            position in prop::collection::vec(prop::num::f64::ANY, 0..5),
-        ) {
-            let message = v1::Constraints {
-                anchors: vec![v1::Anchor { hole: None, uv, position, hard: false }],
-                ..Default::default()
-            };
-            if let Ok(asked) = Constraints::check(&message) {
-                prop_assert!(asked.anchors[0].uv.iter().flatten().all(|x| (0.0..=1.0).contains(x)));
-                prop_assert!(asked.anchors[0].position.iter().all(|x| x.is_finite()));
-            }
-        }
-    }
-}
+#[path = "validate_tests.rs"]
+mod tests;

@@ -84,6 +84,26 @@ pub enum MendError {
         /// Why.
         source: PatchError,
     },
+    /// The patch of the hole is no plausible cloth.
+    #[error(
+        "hole {hole}: its patch is no plausible cloth: {}; `acceptDoubtful` applies it all the same", .doubts.join("; ")
+    )]
+    NoPlausibleFill {
+        /// Id of the hole's loop.
+        hole: u32,
+        /// Why, with numbers.
+        doubts: Vec<String>,
+        /// What was measured of the patch.
+        patch: Box<v1::PatchReport>,
+    },
+    /// No hole could be filled, and there are several.
+    #[error("none of the {holes} holes could be filled; {first}")]
+    NoneFilled {
+        /// How many holes were tried.
+        holes: usize,
+        /// Why the first of them could not be filled.
+        first: Box<MendError>,
+    },
     /// The network failed.
     #[error("the network failed: {0}")]
     Net(#[from] NetError),
@@ -174,6 +194,8 @@ impl MendError {
             MendError::Patch { .. } => codes::PATCH_DEGENERATE,
             MendError::Scan(ScanError::Singular { .. }) => codes::SINGULAR_TRANSFORM,
             MendError::NoCells { .. } => codes::HOLE_TOO_NARROW,
+            MendError::NoPlausibleFill { .. } => codes::NO_PLAUSIBLE_FILL,
+            MendError::NoneFilled { first, .. } => first.code(),
             MendError::Exhausted(exhausted) => match exhausted {
                 Exhausted::Work { .. } => codes::TOO_MUCH_WORK,
                 Exhausted::Memory { .. } => codes::TOO_MUCH_MEMORY,
@@ -183,6 +205,20 @@ impl MendError {
                 Exhausted::Cancelled => codes::DEADLINE_EXCEEDED,
             },
             MendError::Net(_) | MendError::Scan(_) | MendError::Picture(_) => codes::INTERNAL,
+        }
+    }
+
+    /// The hole that the error is about, where the other holes of the scan can be filled all the same.
+    pub fn hole(&self) -> Option<u32> {
+        match self {
+            MendError::NonManifold { hole }
+            | MendError::Region { hole, .. }
+            | MendError::Flatten { hole, .. }
+            | MendError::TooLittleKnown { hole, .. }
+            | MendError::NoCells { hole }
+            | MendError::Patch { hole, .. }
+            | MendError::NoPlausibleFill { hole, .. } => Some(*hole),
+            _ => None,
         }
     }
 

@@ -23,6 +23,8 @@ pub struct PatchDraft<'a> {
     pub patch: Patch,
     /// The share of the network's folds that was kept.
     pub network_share: f32,
+    /// Whether anchors or gestures move the cloth.
+    pub edited: bool,
     /// What the patch should keep to.
     pub constraints: HoleConstraints<'a>,
     /// Milliseconds so far.
@@ -58,6 +60,7 @@ impl<'a> HoleContext<'a> {
             hole,
             patch,
             network_share: unedited.network_share,
+            edited: request.is_edited(),
             constraints,
             timings,
         })

@@ -5,6 +5,7 @@ use std::time::Instant;
 use darn_budget::{Budget, Exhausted, Steps};
 use rstar::{PointDistance as _, RTree};
 
+use crate::doubts::doubts;
 use crate::error::MendError;
 use crate::fill_hole::PatchDraft;
 use crate::hole::Hole;
@@ -52,6 +53,7 @@ impl<'a> PatchDraft<'a> {
             network_share,
             constraints,
             mut timings,
+            ..
         } = self;
         let kept = constraints.kept(&patch)?;
 
@@ -77,6 +79,7 @@ impl<'a> PatchDraft<'a> {
             notes,
             anchors: kept.anchors,
             edits: kept.edits,
+            doubts: doubts(&patch, &quality),
         };
         Ok(FilledHole {
             hole,
@@ -96,7 +99,8 @@ fn chart_report(hole: &Hole) -> v1::ChartReport {
     }
 }
 
-fn patch_report(patch: &Patch, quality: &Quality) -> v1::PatchReport {
+/// What was measured of a patch.
+pub fn patch_report(patch: &Patch, quality: &Quality) -> v1::PatchReport {
     v1::PatchReport {
         vertices: patch.positions.len() as u32,
         faces: patch.faces.len() as u32,

@@ -16,6 +16,7 @@ mod anchor_search;
 mod call_pools;
 mod constraints;
 mod context;
+mod doubts;
 mod edit;
 mod error;
 mod fill_hole;
@@ -25,7 +26,7 @@ mod inpainter;
 mod limits;
 mod mender;
 mod moved_fill;
-mod nearest_hole;
+mod nearest_loop;
 mod network_share;
 mod picture;
 mod port;
@@ -62,11 +63,10 @@ use welded_scan::WeldedScan;
 /// darn's version, as reports and patches name it.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// Fills the holes of a scan that the constraints choose: by default all of them, and never an outer boundary or the
-/// end of a tube.
+/// Fills the loops of a scan that the constraints choose: by default all holes, and no finished opening. Holes that cannot be filled are skipped.
 ///
 /// # Errors
-/// A constraint that does not fit the scan, a chosen hole that cannot be filled, no hole at all; `Exhausted`.
+/// A constraint that does not fit the scan, a named hole that cannot be filled, none that can, no hole at all; `Exhausted`.
 pub fn mend<'a>(
     scan: &Scan,
     constraints: &Constraints,

@@ -107,6 +107,7 @@ pub fn request(anchors: &[Anchor], gestures: &[Gesture]) -> HoleRequest {
         gesture: *gesture,
     };
     HoleRequest {
+        named: true,
         id: 0,
         anchors: entries(anchors.iter().copied()),
         edits: entries(gestures.iter().map(edit)),

@@ -8,6 +8,7 @@ use crate::timings::milliseconds;
 use darn_contract::{excerpt, v1};
 use darn_geometry::mesh::index::{FaceId, VertexId};
 use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind, boundary_loops};
+use darn_geometry::mesh::openings::Evidence;
 use darn_geometry::mesh::topology::Topology;
 use darn_geometry::mesh::weld::{WeldedMesh, weld};
 use darn_gltf_scan::Scan;
@@ -75,7 +76,8 @@ impl WeldedScan {
     /// Bytes of memory that it holds, estimated.
     pub fn bytes(&self) -> usize {
         let mesh = &self.surface.mesh;
-        let loops: usize = self.loops.iter().map(|l| 8 * l.vertices.len()).sum();
+        let loops = self.loops.iter().map(|l| 8 * l.vertices.len() + 200);
+        let loops: usize = loops.sum();
         // For a vertex its position and the topology's entry; for a face its corners, twins and origin.
         (24 + 8) * mesh.positions.len() + (12 + 16 + 4) * mesh.faces.len() + loops
     }
@@ -109,6 +111,9 @@ impl WeldedScan {
                 .map(|name| excerpt(name).into_owned())
                 .unwrap_or_default(),
             component: rim.component,
+            diameter: rim.diameter,
+            confidence: rim.confidence,
+            evidence: rim.evidence.iter().map(evidence).collect(),
         }
     }
 
@@ -175,7 +180,17 @@ impl WeldedScan {
 pub fn kind(kind: LoopKind) -> v1::LoopKind {
     match kind {
         LoopKind::Hole => v1::LoopKind::Hole,
+        LoopKind::Opening => v1::LoopKind::Opening,
         LoopKind::Outer => v1::LoopKind::OuterBoundary,
         LoopKind::TubeEnd => v1::LoopKind::TubeEnd,
+    }
+}
+
+fn evidence(evidence: &Evidence) -> v1::Evidence {
+    v1::Evidence {
+        code: evidence.kind.code().to_owned(),
+        value: evidence.value,
+        weight: evidence.weight,
+        reason: evidence.reason(),
     }
 }

@@ -116,6 +116,10 @@ fn mended(description: &str, part: &str, media_types: &[&str]) -> Value {
         ),
         "headers": {
             "darn-holes-filled": { "description": "Holes filled", "schema": { "type": "integer" } },
+            "darn-result": {
+                "description": "How it went: `filled=3 skipped=1 doubtful=0`; skipped are holes that should have been filled and could not be",
+                "schema": { "type": "string" }
+            },
             "darn-loops-skipped": { "description": "Boundary loops left as they were", "schema": { "type": "integer" } },
             "darn-anchor-distance": {
                 "description": "Largest distance between the cloth and an anchor, those of gestures included, in the scene's unit; \

@@ -95,6 +95,21 @@ pub fn only_edits(constraints: Constraints) -> Result<Constraints, RequestError>
     if constraints.up.is_some() {
         unexpected.push("/up");
     }
+    if constraints.fill.is_some() {
+        unexpected.push("/fill");
+    }
+    if constraints.diameters.max.is_some() {
+        unexpected.push("/maxDiameter");
+    }
+    if constraints.diameters.min.is_some() {
+        unexpected.push("/minDiameter");
+    }
+    if !constraints.except.is_empty() {
+        unexpected.push("/except");
+    }
+    if constraints.accept_doubtful {
+        unexpected.push("/acceptDoubtful");
+    }
     let detail = "chosen when the session was opened; open another for another choice";
     refuse_fields(&unexpected, detail).map(|()| constraints)
 }

@@ -15,10 +15,13 @@ use super::{
     telemetry::Metrics,
 };
 use darn_contract::port::{Mended, PatchForm, Patches};
-use darn_contract::v1;
+use darn_contract::{Outcome, v1};
 
 /// How many holes were filled.
 pub const HOLES_FILLED: HeaderName = HeaderName::from_static("darn-holes-filled");
+/// How it went, without reading the report: `filled=3 skipped=1 doubtful=0`. Skipped are holes that should have been filled and could not be; doubtful
+/// are patches that are no plausible cloth and were applied because the request accepts them.
+pub const RESULT: HeaderName = HeaderName::from_static("darn-result");
 /// How many boundary loops were left as they were.
 pub const LOOPS_SKIPPED: HeaderName = HeaderName::from_static("darn-loops-skipped");
 /// Largest distance between the cloth and an anchor, those of gestures included, in the scene's unit; absent without anchors.
@@ -114,6 +117,8 @@ fn report_headers(report: &v1::Report) -> HeaderMap {
         (HOLES_FILLED, HeaderValue::from(report.holes.len())),
         (LOOPS_SKIPPED, HeaderValue::from(report.skipped.len())),
     ]);
+    let result = Outcome::of(report).to_string();
+    headers.extend(HeaderValue::try_from(result).map(|value| (RESULT, value)));
     let distances = report.holes.iter().flat_map(|hole| {
         let anchors = hole.anchors.iter().map(|anchor| anchor.distance);
         anchors.chain(hole.edits.iter().map(|edit| edit.distance))

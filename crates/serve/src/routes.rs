@@ -25,7 +25,7 @@ use super::{
     error::RequestError,
     media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, PROMETHEUS},
     openapi,
-    response::{self, ANCHOR_DISTANCE, HOLES_FILLED, LOOPS_SKIPPED, MendResponse},
+    response::{self, ANCHOR_DISTANCE, HOLES_FILLED, LOOPS_SKIPPED, MendResponse, RESULT},
     session_routes,
     telemetry::{REQUEST_ID, RequestId},
 };
@@ -81,6 +81,7 @@ fn cors(origins: &[String]) -> CorsLayer {
         .expose_headers([
             HOLES_FILLED,
             LOOPS_SKIPPED,
+            RESULT,
             ANCHOR_DISTANCE,
             REQUEST_ID,
             header::LOCATION,

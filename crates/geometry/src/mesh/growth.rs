@@ -4,7 +4,7 @@ use darn_budget::{Budget, Exhausted};
 
 use super::geodesic::geodesic_distance;
 use super::index::{FaceId, HalfEdgeId, LoopId};
-use super::loops::{BoundaryLoop, LoopKind};
+use super::loops::BoundaryLoop;
 use super::region::BoundedMesh;
 
 /// The smallest reach tried, in mean edge lengths of the rim's faces.
@@ -173,10 +173,9 @@ impl<'a> Growth<'a> {
         }
     }
 
-    /// Whether a piece of the rest that contains this face is no pocket: too deep, or at a loop that is not a hole.
+    /// Whether a piece of the rest that contains this face is no pocket: too deep, or at a loop that cloth does not surround.
     fn stays_outside(&self, face: FaceId, limit: f64) -> bool {
-        let at_open_loop =
-            |h: HalfEdgeId| (self.loop_at(h)).is_some_and(|l| l.kind != LoopKind::Hole);
+        let at_open_loop = |h: HalfEdgeId| (self.loop_at(h)).is_some_and(|l| !l.is_surrounded());
         self.depth(face) > limit || face.half_edges().into_iter().any(at_open_loop)
     }
 

@@ -16,6 +16,7 @@ pub mod intersect;
 pub mod layers;
 pub mod loops;
 pub mod nearest;
+pub mod openings;
 mod pairing;
 pub mod region;
 pub mod shapes;

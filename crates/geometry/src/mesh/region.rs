@@ -5,7 +5,7 @@ use darn_budget::{Budget, Exhausted};
 use super::TriMesh;
 use super::growth::Growth;
 use super::index::{FaceId, HalfEdgeId, LoopId, VertexId};
-use super::loops::{BoundaryLoop, LoopKind};
+use super::loops::BoundaryLoop;
 use super::pairing::Twins;
 use super::topology::Topology;
 
@@ -212,7 +212,7 @@ fn cut_out(growth: &Growth, inside: &[bool], reach: f64) -> Result<Region, Shape
                 rim = vertices;
                 rim.rotate_left(shift);
             }
-            Some(l) if l.kind == LoopKind::Hole => holes.push(vertices),
+            Some(l) if l.is_surrounded() => holes.push(vertices),
             _ => rest.push(vertices),
         }
     }
@@ -254,7 +254,7 @@ fn cut_out(growth: &Growth, inside: &[bool], reach: f64) -> Result<Region, Shape
 pub(crate) fn region_around_hole(mesh: &TriMesh, reach: f64) -> Region {
     let topology = Topology::new(mesh);
     let loops = super::loops::boundary_loops(mesh, &topology);
-    let hole = loops.iter().find(|l| l.kind == LoopKind::Hole);
+    let hole = loops.iter().find(|l| l.is_surrounded());
     let whole = BoundedMesh {
         mesh,
         topology: &topology,

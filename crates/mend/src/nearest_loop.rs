@@ -1,4 +1,4 @@
-//! Finds holes by a place near them: thousands of places among hundreds of thousands of loops.
+//! Finds loops by a place near them: thousands of places among hundreds of thousands of loops.
 
 use crate::welded_scan::WeldedScan;
 use darn_budget::{Budget, Exhausted, Steps};
@@ -6,11 +6,11 @@ use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind};
 use darn_geometry::mesh::nearest::distance_to_loop;
 use darn_geometry::mesh::{TriMesh, Vec3};
 
-/// Finds the hole whose rim is nearest to a point.
-pub struct NearestHole<'a> {
+/// Finds the loop that is nearest to a point; an outer boundary only in a scan that has no other loops.
+pub struct NearestLoop<'a> {
     welded: &'a WeldedScan,
-    /// The holes with the balls around their rims; made when the first point is looked for.
-    holes: Option<Vec<RimBall<'a>>>,
+    /// The loops with the balls around them; made when the first point is looked for.
+    balls: Option<Vec<RimBall<'a>>>,
     steps: Steps<'a>,
 }
 
@@ -26,47 +26,46 @@ const BALL_WORK: u64 = 10;
 /// Nanoseconds of work an edge of a rim for a point.
 const EDGE_WORK: u64 = 20;
 
-impl<'a> NearestHole<'a> {
+impl<'a> NearestLoop<'a> {
     /// Looks in a scan.
-    pub fn of(welded: &'a WeldedScan, budget: &'a Budget<'a>) -> NearestHole<'a> {
-        NearestHole {
+    pub fn of(welded: &'a WeldedScan, budget: &'a Budget<'a>) -> NearestLoop<'a> {
+        NearestLoop {
             welded,
-            holes: None,
+            balls: None,
             steps: Steps::of(budget),
         }
     }
 
-    /// The hole nearest to a point, the first of several, or why there is none.
+    /// The loop nearest to a point, the first of several, or why there is none.
     ///
     /// # Errors
     /// `Exhausted`: a request may have thousands of points, a scan hundreds of thousands of loops.
     pub fn to(&mut self, point: &Vec3) -> Result<Result<&'a BoundaryLoop, String>, Exhausted> {
         let mesh = &self.welded.surface.mesh;
-        let holes = self.holes.get_or_insert_with(|| {
-            let holes = self
-                .welded
-                .loops
-                .iter()
-                .filter(|l| l.kind == LoopKind::Hole);
-            holes.map(|rim| RimBall::of(rim, mesh)).collect()
+        let balls = self.balls.get_or_insert_with(|| {
+            let loops = &self.welded.loops;
+            let only_outer = loops.iter().all(|l| l.kind == LoopKind::Outer);
+            let looked_at = |l: &&BoundaryLoop| only_outer || l.kind != LoopKind::Outer;
+            let rims = loops.iter().filter(looked_at);
+            rims.map(|rim| RimBall::of(rim, mesh)).collect()
         });
-        self.steps.take(BALL_WORK * holes.len() as u64)?;
+        self.steps.take(BALL_WORK * balls.len() as u64)?;
         let mut best: Option<(f64, &BoundaryLoop)> = None;
-        for hole in holes.iter() {
-            let least = (hole.centre - point).norm() - hole.radius;
+        for ball in balls.iter() {
+            let least = (ball.centre - point).norm() - ball.radius;
             if best.is_some_and(|(distance, _)| least > distance) {
                 continue;
             }
             self.steps
-                .take(EDGE_WORK * hole.rim.vertices.len() as u64)?;
-            let distance = distance_to_loop(mesh, hole.rim, point);
+                .take(EDGE_WORK * ball.rim.vertices.len() as u64)?;
+            let distance = distance_to_loop(mesh, ball.rim, point);
             if best.is_none_or(|(least, _)| distance.total_cmp(&least).is_lt()) {
-                best = Some((distance, hole.rim));
+                best = Some((distance, ball.rim));
             }
         }
         Ok(best
             .map(|(_, rim)| rim)
-            .ok_or_else(|| "the scan has no hole".to_owned()))
+            .ok_or_else(|| "the scan has no boundary loop".to_owned()))
     }
 }
 
