@@ -8,6 +8,8 @@ mod bench;
 mod evaluate;
 mod failure;
 mod files;
+#[cfg(feature = "burn")]
+mod garments;
 mod healthcheck;
 mod holes;
 mod inpaint;
@@ -61,6 +63,9 @@ enum CliCommand {
     /// Simulate sheets of cloth to train on
     #[cfg(feature = "burn")]
     Scarffolds(scarffolds::ScarffoldsArgs),
+    /// Drape garments with openings and holes, whose truth is known, over simple bodies
+    #[cfg(feature = "burn")]
+    Garments(garments::GarmentsArgs),
     /// Write samples to learn from to standard output, for a trainer outside this program
     #[cfg(feature = "burn")]
     Samples(samples::SamplesArgs),
@@ -113,6 +118,8 @@ fn run(command: CliCommand) -> Result<(), Failure> {
         CliCommand::Healthcheck(args) => healthcheck::run(&args),
         #[cfg(feature = "burn")]
         CliCommand::Scarffolds(args) => scarffolds::run(&args),
+        #[cfg(feature = "burn")]
+        CliCommand::Garments(args) => garments::run(&args),
         #[cfg(feature = "burn")]
         CliCommand::Samples(args) => samples::run(&args),
         #[cfg(feature = "burn")]

@@ -8,6 +8,7 @@ mod cell_normals;
 mod line_chart;
 
 pub mod evaluate;
+pub mod garments;
 pub mod scarffolds;
 pub mod train;
 pub mod unet;

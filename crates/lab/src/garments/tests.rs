@@ -1,0 +1,1 @@
+//! Laws of garments and their sets.
