@@ -2,26 +2,36 @@
 
 use super::failure::{Failure, OrFail};
 use super::files;
-use super::mended::mended;
+use super::garments::made;
+use super::mended::{listed, mended, mended_at};
 use super::network::mender;
 use super::progress::WorkProgress;
 use crate::settings::NetworkArgs;
 use darn_geometry::grid::NormalGrid;
+use darn_geometry::mesh::TriMesh;
 use darn_geometry::patch::PatchOptions;
 use darn_lab::evaluate::{
-    self, EvaluateError, EvaluationPlan, GridShares, HoleKind, ScanRow, SyntheticScanOptions,
+    self, AskedHole, EvaluateError, EvaluationPlan, GarmentMender, GridShares, HoleKind, ScanRow,
+    SyntheticScanOptions,
 };
+use darn_lab::garments;
 use darn_lab::scarffolds::samples::{SampleRotation, Sampler};
 use darn_lab::scarffolds::sheets::{self, SimulatedSheet};
 use darn_net::{Averaging, FillRequest};
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
 pub struct EvaluateArgs {
     /// Folder of sheets to be measured on, as `darn scarffolds` makes it; none of them may have been trained on
-    #[arg(long)]
-    sheets: PathBuf,
+    #[arg(long, required_unless_present = "garments")]
+    sheets: Option<PathBuf>,
+    /// Mend a set of garments end to end instead, as `darn garments` makes it; without a folder, two of each kind are made from the seed
+    #[arg(long, value_name = "DIR", num_args = 0..=1, conflicts_with_all = ["sheets", "noise", "picture", "upright", "scans", "masks", "once"])]
+    garments: Option<Option<PathBuf>>,
+    /// Measure the mended garments of another filler instead: a folder with a GLB of the hole's name for each
+    #[arg(long, value_name = "FOLDER", requires = "garments")]
+    mended: Option<PathBuf>,
     /// How many samples, the sheets in turn
     #[arg(long, value_name = "N", default_value_t = 100)]
     samples: usize,
@@ -57,8 +67,12 @@ pub struct EvaluateArgs {
 }
 
 pub fn run(args: &EvaluateArgs) -> Result<(), Failure> {
-    let name = args.sheets.display();
-    let sheets = sheets::read(&args.sheets).or_fail(format!("read sheets in {name}"))?;
+    if let Some(set) = &args.garments {
+        return garments(args, set.as_deref());
+    }
+    let folder = args.sheets.clone().unwrap_or_default();
+    let name = folder.display();
+    let sheets = sheets::read(&folder).or_fail(format!("read sheets in {name}"))?;
     if sheets.is_empty() || args.samples == 0 {
         return Err(Failure::Usage("there is nothing to measure".into()));
     }
@@ -133,6 +147,38 @@ impl EvaluateArgs {
         all.sort_by(f64::total_cmp);
         all.dedup();
         all
+    }
+}
+
+/// Measures mends of garments, ours or another filler's.
+fn garments(args: &EvaluateArgs, set: Option<&Path>) -> Result<(), Failure> {
+    let cases = match set {
+        Some(dir) => {
+            garments::set::read(dir).or_fail(format!("read garments in {}", dir.display()))?
+        }
+        None => made(args.seed, 2)?,
+    };
+    let mender = mender(&args.network)?;
+    let list = |mesh: &TriMesh| listed(mesh);
+    let mend = |asked: &AskedHole| match &args.mended {
+        Some(folder) => {
+            let path = folder.join(&asked.record.file);
+            garments::set::read_mesh(&path).map_err(|e| EvaluateError::Mender(Box::new(e)))
+        }
+        None => mended_at(asked.mesh, asked.at, &mender),
+    };
+    let progress = WorkProgress::counted("garments", cases.len() as u64);
+    let ours = GarmentMender {
+        list: args.mended.is_none().then_some(&list),
+        mend: &mend,
+    };
+    let report = evaluate::over_garments(&cases, &ours, &|| progress.advance(1));
+    drop(progress);
+    let report = report.or_fail("evaluate")?;
+    print!("{}", report.markdown());
+    match &args.json {
+        Some(path) => files::write(path, &pretty(&json!(report))?),
+        None => Ok(()),
     }
 }
 

@@ -1,12 +1,14 @@
 //! Evaluation: fills of held-out samples and mends of whole scans, measured against the known truth.
 //!
-//! [`run`] measures a network beside smooth fills and the truth on cases from [`draw`]; [`over_scans`] measures scans mended end to end;
+//! [`run`] measures a network beside smooth fills and the truth on cases from [`draw`]; [`over_scans`] and
+//! [`over_garments`] measure scans and garments mended end to end;
 //! [`of_samples`] and [`of_flattened`] compare the holes of training samples with those of flattened scans. The network and the mender are
 //! functions that the caller passes in, sheets come from the caller, and results are values: no files, no training, no HTTP.
 
 mod cases;
 mod charts;
 mod error;
+mod garment_rows;
 mod grid_shares;
 mod hole_kind;
 mod metrics;
@@ -21,6 +23,9 @@ mod tests;
 pub use cases::{EvaluationCase, HoleSize, draw};
 pub use charts::picture;
 pub use error::EvaluateError;
+pub use garment_rows::{
+    AskedHole, GarmentMender, GarmentReport, GarmentRow, ListedLoop, OpeningRow, over_garments,
+};
 pub use grid_shares::{GridShares, of_flattened, of_samples};
 pub use hole_kind::HoleKind;
 pub use metrics::FillMetrics;

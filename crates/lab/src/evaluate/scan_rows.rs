@@ -84,7 +84,7 @@ pub fn over_scans(
             }
         }
         let mended = mend(&scan).ok()?;
-        let metrics = ScanMetrics::of(&scan, &mended, &mut rng)?;
+        let metrics = ScanMetrics::of(&scan.mesh, &scan.lost, &mended, &mut rng)?;
         Some(ScanRow {
             sheet: number,
             cut: kind,
@@ -95,18 +95,24 @@ pub fn over_scans(
 }
 
 impl ScanMetrics {
-    fn of(scan: &HoledScan, mended: &TriMesh, rng: &mut ChaCha8Rng) -> Option<ScanMetrics> {
-        let own = new_faces(&scan.mesh, mended);
+    /// The metrics of a mended mesh; `kept` is the mesh before, `lost` the cloth that was cut out of it. `None` if one has no area.
+    pub(super) fn of(
+        kept: &TriMesh,
+        lost: &TriMesh,
+        mended: &TriMesh,
+        rng: &mut ChaCha8Rng,
+    ) -> Option<ScanMetrics> {
+        let own = new_faces(kept, mended);
         let patch = TriMesh {
             positions: mended.positions.clone(),
             faces: own.iter().map(|f| mended.faces[*f as usize]).collect(),
         };
-        let areas = [&patch, &scan.lost].map(|mesh| face_areas(mesh).iter().sum::<f64>());
+        let areas = [&patch, lost].map(|mesh| face_areas(mesh).iter().sum::<f64>());
         if areas.iter().any(|area| *area <= 0.0) {
             return None;
         }
         let diameter = 2.0 * (areas[1] / std::f64::consts::PI).sqrt();
-        let points = [points(&patch, rng), points(&scan.lost, rng)];
+        let points = [points(&patch, rng), points(lost, rng)];
         let [there, back] = [0, 1].map(|k: usize| nearest(&points[k], &points[1 - k]));
         let mean =
             |all: &[NearestPoint]| all.iter().map(|x| x.distance).sum::<f64>() / all.len() as f64;
@@ -127,7 +133,7 @@ impl ScanMetrics {
 }
 
 /// Faces of `after` that `before` does not have, by the positions of their corners.
-fn new_faces(before: &TriMesh, after: &TriMesh) -> Vec<u32> {
+pub(super) fn new_faces(before: &TriMesh, after: &TriMesh) -> Vec<u32> {
     let key = |mesh: &TriMesh, face: &[u32; 3]| {
         let mut corners = face.map(|v| {
             let p = mesh.positions[v as usize];

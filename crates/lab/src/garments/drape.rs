@@ -19,7 +19,7 @@ const SETTLE: usize = 600;
 /// Rounds that remove the last stretch.
 const RELAX: usize = 40;
 /// Least distance of two layers, in spacings.
-const THICKNESS: f64 = 0.75;
+const THICKNESS: f64 = 0.95;
 
 /// A garment at rest.
 pub(super) struct Draped {

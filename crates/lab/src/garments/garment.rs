@@ -13,9 +13,9 @@ use serde::{Deserialize, Serialize};
 /// Drapes simulated before a seed is given up.
 const ATTEMPTS: u32 = 3;
 /// Most pairs of triangles that may cut each other, ÷ faces.
-const MOST_CROSSINGS: f64 = 0.004;
+const MOST_CROSSINGS: f64 = 0.006;
 /// Most strain of woven cloth.
-const MOST_STRAIN: f64 = 0.05;
+const MOST_STRAIN: f64 = 0.07;
 
 /// The kinds of garments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]

@@ -145,8 +145,8 @@ fn sleeve(rng: &mut impl Rng) -> Cut {
         .line([top, length], Seam(0))
         .line([-top, length], Open(0))
         .line([-cuff, 0.0], Seam(1));
-    let bend: f32 = rng.random_range(0.3..1.3);
-    let (half, slack) = (0.5 * length as f32, rng.random_range(0.02..0.09f32));
+    let bend: f32 = rng.random_range(0.2..0.9);
+    let (half, slack) = (0.5 * length as f32, rng.random_range(0.01..0.05f32));
     let arm = Limb {
         root: [0.0, 0.0, 2.0 * half + 0.05],
         lengths: [half + 0.05, half + 0.05],
@@ -210,7 +210,7 @@ fn shirt(rng: &mut impl Rng, top: Top) -> Cut {
     let vest = top == Top::Vest;
     let half = match top {
         Top::Shirt => rng.random_range(0.24..0.28),
-        Top::Vest => rng.random_range(0.185..0.205),
+        Top::Vest => rng.random_range(0.2..0.23),
     };
     let length = rng.random_range(0.56..0.66);
     let (neck, depth) = (rng.random_range(0.08..0.095), rng.random_range(0.06..0.1));
@@ -301,6 +301,16 @@ fn shirt(rng: &mut impl Rng, top: Top) -> Cut {
             [0.065, 0.055],
         ),
     ];
+    // Belly and chest come forward with the pose: cloth over them does not lie flat.
+    let bulge = |x: f32, level: f32, forward: f32, radius: f32| Capsule {
+        start: [[x, 0.0, level], [x, 0.0, level + 0.02]],
+        pose: [[x, -forward, level], [x, -forward, level + 0.02]],
+        radius: [radius, radius],
+    };
+    let out = rng.random_range(0.03..0.07);
+    capsules.push(bulge(0.0, 0.45 * high - 0.06, out, 0.1));
+    capsules.push(bulge(-0.075, high - 0.26, out + 0.035, 0.06));
+    capsules.push(bulge(0.075, high - 0.26, out + 0.035, 0.06));
     for side in [-1.0f32, 1.0] {
         let down: f32 = rng.random_range(0.3..1.0);
         let bend: f32 = rng.random_range(0.0..0.9);
@@ -404,7 +414,7 @@ fn glove(rng: &mut impl Rng) -> Cut {
         .line([wide, 0.072], Seam(2))
         .line([wide, palm], Seam(3));
     let mut body = Vec::new();
-    let curl: f32 = rng.random_range(0.1..0.9);
+    let curl: f32 = rng.random_range(0.05..0.5);
     for k in 0..4 {
         let right = wide - k as f64 * (finger + gap);
         let (left, middle) = (right - finger, right - 0.5 * finger);
