@@ -5,3 +5,4 @@ mod editing;
 mod laws;
 mod requests;
 mod rims;
+mod tubes;

@@ -46,7 +46,7 @@ impl PatchSource<'_> {
             patch,
             report,
         } = filled;
-        let (region, chart) = (&hole.region, &hole.chart);
+        let region = hole.region();
         let faces = region.faces.iter();
         let sources: Vec<Option<SourceFace>> = faces.map(|f| welded.source(scan, *f)).collect();
         let part = majority(patch, region, &sources);
@@ -94,7 +94,7 @@ impl PatchSource<'_> {
             budget,
         };
         let (dressed, normals) = rayon::join(
-            || extend_attributes(&hole.plan, patch, region, chart, &columns),
+            || extend_attributes(&hole.attribute_map(), patch, region, &columns),
             || normals(patch, region),
         );
         let dressed = dressed?;
@@ -199,8 +199,7 @@ fn normals(patch: &Patch, region: &Region) -> Vec<Vec3> {
 /// the same input gives the same bytes.
 fn provenance(report: &v1::HoleReport, card: &WeightsCard) -> serde_json::Value {
     let patch = report.patch.clone().unwrap_or_default();
-    let chart = report.chart.unwrap_or_default();
-    json!({
+    let mut said = json!({
         "reconstructed": true,
         "hole": report.id,
         "version": VERSION,
@@ -208,7 +207,8 @@ fn provenance(report: &v1::HoleReport, card: &WeightsCard) -> serde_json::Value 
         "anchors": report.anchors.len(),
         "edits": report.edits.len(),
         "refinement": patch.refinement,
-        "chart": { "stretchMean": chart.stretch_mean, "stretchMax": chart.stretch_max },
+        "chart": (report.chart)
+            .map(|c| json!({ "stretchMean": c.stretch_mean, "stretchMax": c.stretch_max })),
         "patch": {
             "area": patch.area,
             "stretchMean": patch.stretch_mean,
@@ -216,5 +216,12 @@ fn provenance(report: &v1::HoleReport, card: &WeightsCard) -> serde_json::Value 
             "gaussianCurvature": patch.gaussian_curvature,
             "selfIntersections": patch.self_intersections,
         },
-    })
+    });
+    // Without a chart there is no network in the patch either.
+    if let (None, Some(said)) = (report.chart, said.as_object_mut()) {
+        said.insert("method".to_owned(), json!(patch.method));
+        said.remove("chart");
+        said.remove("weights");
+    }
+    said
 }

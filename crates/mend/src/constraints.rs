@@ -38,6 +38,7 @@ pub struct HoleConstraints<'a> {
 }
 
 /// How a patch kept the constraints, in the contract's words.
+#[derive(Default)]
 pub struct KeptConstraints {
     /// One for each anchor of the hole.
     pub anchors: Vec<v1::AnchorReport>,

@@ -37,8 +37,11 @@ pub fn doubts(patch: &Patch, quality: &Quality) -> Vec<String> {
 }
 
 /// The largest stretch of the edges with an inner vertex that are longer than in the chart by more than the rim's mean edge; 1 without such edges,
-/// infinite where a length is not a number.
+/// infinite where a length is not a number. A patch without a chart has no stretch.
 fn largest_stretch(patch: &Patch) -> f64 {
+    if patch.flat.is_empty() {
+        return 1.0;
+    }
     let (rim, place) = (patch.rim.len(), |v: u32| patch.positions[v as usize]);
     let length: f64 = (0..rim)
         .map(|k| (patch.positions[(k + 1) % rim] - patch.positions[k]).norm())
@@ -74,9 +77,9 @@ impl PatchDraft<'_> {
 
     /// The error of a draft that is not applied.
     pub fn left(&self, doubts: Vec<String>) -> MendError {
-        let measured = patch_report(&self.patch, &self.quality());
+        let measured = patch_report(self.hole, &self.patch, &self.quality());
         MendError::NoPlausibleFill {
-            hole: self.hole.id,
+            hole: self.hole.id(),
             doubts,
             patch: Box::new(v1::PatchReport {
                 network_share: f64::from(self.network_share),
@@ -86,6 +89,6 @@ impl PatchDraft<'_> {
     }
 
     fn quality(&self) -> Quality {
-        quality::measure(&self.patch, &self.hole.region)
+        quality::measure(&self.patch, self.hole.region())
     }
 }

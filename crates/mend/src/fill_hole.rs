@@ -5,7 +5,7 @@ use std::time::Instant;
 use crate::constraints::HoleConstraints;
 use crate::context::HoleContext;
 use crate::error::MendError;
-use crate::hole::Hole;
+use crate::prepared_hole::HoleRef;
 use crate::select::HoleRequest;
 use crate::timings::milliseconds;
 use darn_contract::v1;
@@ -18,15 +18,15 @@ const MAX_TRIES: usize = 2;
 /// A hole's patch before it is measured and reported.
 pub struct PatchDraft<'a> {
     /// The hole.
-    pub hole: &'a Hole,
+    pub hole: HoleRef<'a>,
     /// The triangles.
     pub patch: Patch,
     /// The share of the network's folds that was kept.
     pub network_share: f32,
     /// Whether anchors or gestures move the cloth.
     pub edited: bool,
-    /// What the patch should keep to.
-    pub constraints: HoleConstraints<'a>,
+    /// What the patch should keep to; `None` for a hole without a chart.
+    pub constraints: Option<HoleConstraints<'a>>,
     /// Milliseconds so far.
     pub timings: v1::HoleTimings,
 }
@@ -57,11 +57,11 @@ impl<'a> HoleContext<'a> {
             patch
         };
         Ok(PatchDraft {
-            hole,
+            hole: HoleRef::Charted(hole),
             patch,
             network_share: unedited.network_share,
             edited: request.is_edited(),
-            constraints,
+            constraints: Some(constraints),
             timings,
         })
     }

@@ -7,8 +7,10 @@ use rstar::{PointDistance as _, RTree};
 
 use crate::doubts::doubts;
 use crate::error::MendError;
+use crate::fair_hole::FairHole;
 use crate::fill_hole::PatchDraft;
 use crate::hole::Hole;
+use crate::prepared_hole::HoleRef;
 use crate::timings::milliseconds;
 use crate::welded_scan::{WeldedScan, kind};
 use darn_contract::v1;
@@ -30,7 +32,7 @@ const NEAREST_WORK: u64 = 300;
 /// A hole's patch and its report.
 pub struct FilledHole<'a> {
     /// The hole.
-    pub hole: &'a Hole,
+    pub hole: HoleRef<'a>,
     /// The triangles.
     pub patch: Patch,
     /// The report.
@@ -55,25 +57,25 @@ impl<'a> PatchDraft<'a> {
             mut timings,
             ..
         } = self;
-        let kept = constraints.kept(&patch)?;
+        let kept = (constraints.as_ref().map(|c| c.kept(&patch)).transpose()?).unwrap_or_default();
 
         let started = Instant::now();
-        let quality = quality::measure(&patch, &hole.region);
+        let quality = quality::measure(&patch, hole.region());
         timings.report = milliseconds(started);
         let mut notes = notes(hole, &quality);
         notes.extend(loose_pieces_note(hole, &patch, welded, budget)?);
-        notes.extend(constraints.notes(&kept.anchors));
-        let rim = &welded.loops[hole.id as usize];
+        notes.extend(constraints.iter().flat_map(|c| c.notes(&kept.anchors)));
+        let rim = &welded.loops[hole.id() as usize];
         let report = v1::HoleReport {
-            id: hole.id,
+            id: hole.id(),
             kind: kind(rim.kind) as i32,
             length: rim.length,
             vertices: rim.vertices.len() as u32,
-            chart: Some(chart_report(hole)),
-            grid: Some(hole.report),
+            chart: hole.charted().map(chart_report),
+            grid: hole.charted().map(|hole| hole.report),
             patch: Some(v1::PatchReport {
                 network_share: f64::from(network_share),
-                ..patch_report(&patch, &quality)
+                ..patch_report(hole, &patch, &quality)
             }),
             timings: Some(timings),
             notes,
@@ -100,8 +102,17 @@ fn chart_report(hole: &Hole) -> v1::ChartReport {
 }
 
 /// What was measured of a patch.
-pub fn patch_report(patch: &Patch, quality: &Quality) -> v1::PatchReport {
+pub fn patch_report(hole: HoleRef, patch: &Patch, quality: &Quality) -> v1::PatchReport {
+    let (method, stages) = match hole {
+        HoleRef::Charted(_) => ("network", "strain_limiting"),
+        HoleRef::Fair(_) => ("fair", "fairing"),
+    };
     v1::PatchReport {
+        method: method.to_owned(),
+        refinement: match patch.collisions {
+            0 => stages.to_owned(),
+            _ => format!("{stages}+collisions"),
+        },
         vertices: patch.positions.len() as u32,
         faces: patch.faces.len() as u32,
         area: quality.area,
@@ -111,11 +122,6 @@ pub fn patch_report(patch: &Patch, quality: &Quality) -> v1::PatchReport {
         seam_gap: quality.seam_gap,
         self_intersections: quality.self_intersections as u32,
         strain_iterations: patch.strain_rounds as u32,
-        refinement: match patch.collisions {
-            0 => "strain_limiting",
-            _ => "strain_limiting+collisions",
-        }
-        .to_owned(),
         ..v1::PatchReport::default()
     }
 }
@@ -126,12 +132,12 @@ pub fn patch_report(patch: &Patch, quality: &Quality) -> v1::PatchReport {
 /// # Errors
 /// `Exhausted`: every other piece is looked at for every hole.
 fn loose_pieces_note(
-    hole: &Hole,
+    hole: HoleRef,
     patch: &Patch,
     welded: &WeldedScan,
     budget: &Budget,
 ) -> Result<Option<String>, Exhausted> {
-    let rim = &welded.loops[hole.id as usize];
+    let rim = &welded.loops[hole.id() as usize];
     let others =
         (welded.loops.iter()).filter(|l| l.kind == LoopKind::Outer && l.component != rim.component);
     let mut others = others.peekable();
@@ -176,18 +182,23 @@ fn loose_pieces_note(
 }
 
 /// What a person should look at before trusting the patch.
-fn notes(hole: &Hole, quality: &Quality) -> Vec<String> {
+fn notes(hole: HoleRef, quality: &Quality) -> Vec<String> {
     let mut notes = Vec::new();
-    if hole.denoised {
+    if let HoleRef::Fair(FairHole { reason, .. }) = hole {
+        notes.push(format!(
+            "the cloth around the hole cannot be laid flat ({reason}); a fair surface without folds closes it"
+        ));
+    }
+    if hole.denoised() {
         notes.push(
             "the scan is noisy: the cloth around the hole was seen without that noise, its rim was kept"
                 .into(),
         );
     }
-    if hole.chart.stretch_max > SUSPICIOUS {
+    let most = hole.charted().map_or(1.0, |hole| hole.chart.stretch_max);
+    if most > SUSPICIOUS {
         notes.push(format!(
-            "the cloth around the hole does not lie flat well: an edge is stretched {:.2} times",
-            hole.chart.stretch_max
+            "the cloth around the hole does not lie flat well: an edge is stretched {most:.2} times"
         ));
     }
     if quality.stretch_max > SUSPICIOUS {
@@ -200,7 +211,7 @@ fn notes(hole: &Hole, quality: &Quality) -> Vec<String> {
             quality.self_intersections
         ));
     }
-    let others = hole.region.holes.len();
+    let others = hole.region().holes.len();
     if others > 0 {
         notes.push(format!(
             "{others} other hole(s) lie in the region and were unknown to the network"

@@ -2,7 +2,8 @@
 //! all stages.
 //!
 //! In order: `welded_scan` welds the triangles and finds the boundary loops, `select` matches a request to loops,
-//! `prepare` lays the cloth around a hole flat and makes a `hole` of it, `constraints` places anchors and gestures on
+//! `prepare` lays the cloth around a hole flat and makes a `hole` of it (a `prepared_hole` is this, or a `fair_hole` where
+//! the cloth cannot be laid flat), `constraints` places anchors and gestures on
 //! it, `moved_fill` asks the network for cloth that moved, `fill_hole` meshes it, `separate` pushes neighbouring
 //! patches apart, `hole_report` measures the patch, and `addition` writes it in glTF terms. `scan_holes` runs these
 //! stages for all holes of a scan; [`mend`] drops it, a [`ScanSession`] keeps it. `edit` holds the gestures and the
@@ -19,6 +20,7 @@ mod context;
 mod doubts;
 mod edit;
 mod error;
+mod fair_hole;
 mod fill_hole;
 mod hole;
 mod hole_report;
@@ -31,6 +33,7 @@ mod network_share;
 mod picture;
 mod port;
 mod prepare;
+mod prepared_hole;
 mod scan_holes;
 mod select;
 mod separate;

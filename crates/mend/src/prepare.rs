@@ -16,7 +16,7 @@ use darn_geometry::grid::{self, CELLS, Grid, Normalisation};
 use darn_geometry::mesh::denoise::denoise;
 use darn_geometry::mesh::index::LoopId;
 use darn_geometry::mesh::layers::layers_near;
-use darn_geometry::mesh::region::{self, BoundedMesh, Region, RegionError};
+use darn_geometry::mesh::region::{self, Region, RegionError};
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
 use darn_geometry::patch::{self, PatchError, PatchMesh, PatchMetric};
 use darn_geometry::polygon::{extent, inside};
@@ -29,6 +29,9 @@ const REACH_TOLERANCE: f64 = 1.3;
 const SHRINK: f64 = 0.6;
 /// Reach of the collar that the extent of a hole is first measured on, as a share of the reach that suits a round hole.
 const COLLAR: f64 = 0.2;
+/// Largest mean stretch of a chart of cloth that was cut open: other surfaces that wrap around than tubes have more, and
+/// a smaller region serves them better.
+const TUBE_STRETCH: f64 = 1.05;
 /// Tries with smaller and smaller regions.
 const MAX_TRIES: usize = 4;
 /// Nanoseconds of work of a grid and its plates.
@@ -140,13 +143,40 @@ impl Preparation<'_> {
         Ok(again)
     }
 
-    /// Grows and flattens a region of this reach.
+    /// Grows and flattens a region of this reach. Where it wraps around a tube it is cut open, if it lies flat so.
     fn flattened(&self, reach: f64) -> Result<FlatRegion, MendError> {
-        let hole = self.id;
         let started = Instant::now();
-        let region =
-            grown(self.welded, hole, reach, self.call.budget).map_err(MendError::region(hole))?;
+        let region = grown(self.welded, self.id, reach, self.call.budget);
         let grown_ms = milliseconds(started);
+        let wraps = match &region {
+            Ok(region) => region.wraps,
+            Err(error) => matches!(error, RegionError::NotADisk { .. }),
+        };
+        if wraps && let Some(open) = self.cut_open(reach)? {
+            return Ok(open);
+        }
+        self.laid_flat(region.map_err(MendError::region(self.id))?, grown_ms)
+    }
+
+    /// The region of this reach around a tube, cut open and laid flat; `None` where it does not lie flat.
+    fn cut_open(&self, reach: f64) -> Result<Option<FlatRegion>, MendError> {
+        let started = Instant::now();
+        let (whole, rim) = (self.welded.bounded(), LoopId(self.id));
+        let region = region::grow_cut_open(&whole, rim, reach, self.call.budget)
+            .map_err(MendError::region(self.id))?;
+        let Some(region) = region else {
+            return Ok(None);
+        };
+        match self.laid_flat(region, milliseconds(started)) {
+            Ok(flat) if flat.chart.stretch_mean <= TUBE_STRETCH => Ok(Some(flat)),
+            Err(MendError::Exhausted(exhausted)) => Err(exhausted.into()),
+            _ => Ok(None),
+        }
+    }
+
+    /// Flattens a region that took so many milliseconds to grow.
+    fn laid_flat(&self, region: Region, grown_ms: f64) -> Result<FlatRegion, MendError> {
+        let hole = self.id;
         let started = Instant::now();
         let smooth = (self.denoise)(&region.mesh)?.map(|mesh| Region {
             mesh,
@@ -287,12 +317,7 @@ fn grid_report(sampled: &SampledGrid, rim_uv: &[Vec2]) -> v1::GridReport {
 
 /// The region around a loop, of this reach in scene units.
 fn grown(welded: &WeldedScan, id: u32, reach: f64, budget: &Budget) -> Result<Region, RegionError> {
-    let whole = BoundedMesh {
-        mesh: &welded.surface.mesh,
-        topology: &welded.topology,
-        loops: &welded.loops,
-    };
-    region::grow(&whole, LoopId(id), reach, budget)
+    region::grow(&welded.bounded(), LoopId(id), reach, budget)
 }
 
 /// Reach of the region around a hole of this extent; both in scene units.

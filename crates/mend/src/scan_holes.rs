@@ -10,11 +10,10 @@ use crate::addition::PatchSource;
 use crate::context::HoleContext;
 use crate::error::MendError;
 use crate::fill_hole::PatchDraft;
-use crate::hole::Hole;
 use crate::hole_report::FilledHole;
 use crate::inpainter::Inpainter;
 use crate::mender::{Call, NetworkMender};
-use crate::prepare::prepare_hole;
+use crate::prepared_hole::PreparedHole;
 use crate::select::{HoleRequest, Selection, skipped_for};
 use crate::separate::separate;
 use crate::timings::milliseconds;
@@ -29,7 +28,7 @@ pub struct ScanHoles {
     /// The scan's surface.
     pub welded: WeldedScan,
     /// The holes, in order of id.
-    pub holes: Vec<Hole>,
+    pub holes: Vec<PreparedHole>,
     /// Milliseconds of preparing them.
     pub prepare_ms: f64,
     /// What the request selected.
@@ -110,9 +109,9 @@ impl ScanHoles {
         let started = Instant::now();
         let prepare = |request: &HoleRequest| {
             call.budget.check()?;
-            prepare_hole(&welded, request.id, call)
+            PreparedHole::new(&welded, request.id, call)
         };
-        let holes: Vec<Result<Hole, MendError>> =
+        let holes: Vec<Result<PreparedHole, MendError>> =
             selection.requests.par_iter().map(prepare).collect();
         let Sorted { filled, failed } = sorted(&selection.requests, holes, &welded)?;
         let selection = selection.without(failed);
@@ -165,8 +164,12 @@ impl ScanHoles {
         let started = Instant::now();
         let drafts = selection.requests.par_iter().map(|request| {
             call.budget.check()?;
-            let hole = self.opened(request.id)?;
-            HoleContext::new(hole, &inpainter, call)?.fill(request)
+            match self.opened(request.id)? {
+                PreparedHole::Charted(hole) => {
+                    HoleContext::new(hole, &inpainter, call)?.fill(request)
+                }
+                PreparedHole::Fair(hole) => hole.fill(request),
+            }
         });
         let drafts = drafts.map(|draft| {
             let draft: PatchDraft = draft?;
@@ -261,11 +264,17 @@ impl ScanHoles {
     /// # Errors
     /// At `/hole` and `/start` when they do not fit; a failure of the network; `Exhausted`.
     pub fn search(&self, search: &Search, call: Call) -> Result<v1::AnchorFound, MendError> {
-        let id = searched_hole(search, self.holes.iter().map(|h| h.id))?;
+        let id = searched_hole(search, self.holes.iter().map(PreparedHole::id))?;
         let Some(hole) = self.hole(id) else {
             let detail = format!("hole {id} was not chosen when the scan was opened");
             let wrong = FieldError::new("/hole", detail);
             return Err(MendError::Constraints(vec![wrong]));
+        };
+        let hole = match hole {
+            PreparedHole::Charted(hole) => hole,
+            PreparedHole::Fair(hole) => {
+                return Err(MendError::Constraints(vec![hole.no_chart("/hole")]));
+            }
         };
         let inpainter = self.inpainter(call.mender)?;
         let context = HoleContext::new(hole, &inpainter, call)?;
@@ -277,13 +286,13 @@ impl ScanHoles {
         Inpainter::choose(&mender.networks, self.weights.as_deref(), self.up)
     }
 
-    fn hole(&self, id: u32) -> Option<&Hole> {
-        self.holes.iter().find(|h| h.id == id)
+    fn hole(&self, id: u32) -> Option<&PreparedHole> {
+        self.holes.iter().find(|h| h.id() == id)
     }
 
-    fn opened(&self, id: u32) -> Result<&Hole, MendError> {
+    fn opened(&self, id: u32) -> Result<&PreparedHole, MendError> {
         self.hole(id).ok_or_else(|| {
-            let opened: Vec<String> = self.holes.iter().map(|h| h.id.to_string()).collect();
+            let opened: Vec<String> = self.holes.iter().map(|h| h.id().to_string()).collect();
             let detail = format!(
                 "hole {id} was not chosen when the scan was opened; there are: {}",
                 opened.join(", ")

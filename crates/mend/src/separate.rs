@@ -20,7 +20,7 @@ pub fn separate(drafts: &mut [PatchDraft], budget: &Budget) -> Result<(), Exhaus
         let own = &mut rest[0];
         let others = near(own, before);
         if !others.faces.is_empty() {
-            own.hole.plan.separate(&mut own.patch, &others, budget)?;
+            own.hole.separate(&mut own.patch, &others, budget)?;
         }
     }
     Ok(())
@@ -56,7 +56,7 @@ fn near(own: &PatchDraft, others: &[PatchDraft]) -> TriMesh {
 
 /// The rim's vertices as vertices of the welded scan.
 fn rim<'a>(draft: &'a PatchDraft) -> impl Iterator<Item = u32> + 'a {
-    let region = &draft.hole.region;
+    let region = draft.hole.region();
     draft
         .patch
         .rim

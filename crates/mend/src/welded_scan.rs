@@ -9,6 +9,7 @@ use darn_contract::{excerpt, v1};
 use darn_geometry::mesh::index::{FaceId, VertexId};
 use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind, boundary_loops};
 use darn_geometry::mesh::openings::Evidence;
+use darn_geometry::mesh::region::BoundedMesh;
 use darn_geometry::mesh::topology::Topology;
 use darn_geometry::mesh::weld::{WeldedMesh, weld};
 use darn_gltf_scan::Scan;
@@ -80,6 +81,15 @@ impl WeldedScan {
         let loops: usize = loops.sum();
         // For a vertex its position and the topology's entry; for a face its corners, twins and origin.
         (24 + 8) * mesh.positions.len() + (12 + 16 + 4) * mesh.faces.len() + loops
+    }
+
+    /// The welded mesh with its borders.
+    pub fn bounded(&self) -> BoundedMesh<'_> {
+        BoundedMesh {
+            mesh: &self.surface.mesh,
+            topology: &self.topology,
+            loops: &self.loops,
+        }
     }
 
     /// The scan's face that a welded face was made of.

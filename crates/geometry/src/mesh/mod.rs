@@ -18,9 +18,11 @@ pub mod loops;
 pub mod nearest;
 pub mod openings;
 mod pairing;
+mod piece;
 pub mod region;
 pub mod shapes;
 pub mod topology;
+mod tube_cut;
 pub mod turning;
 pub mod weld;
 

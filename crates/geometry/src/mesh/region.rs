@@ -4,10 +4,11 @@ use darn_budget::{Budget, Exhausted};
 
 use super::TriMesh;
 use super::growth::Growth;
-use super::index::{FaceId, HalfEdgeId, LoopId, VertexId};
+use super::index::{FaceId, LoopId, VertexId};
 use super::loops::BoundaryLoop;
-use super::pairing::Twins;
+use super::piece::Piece;
 use super::topology::Topology;
+use super::tube_cut::{CutEdges, add_cut};
 
 /// A piece of the mesh around one hole, as a mesh of its own.
 ///
@@ -16,8 +17,8 @@ use super::topology::Topology;
 pub struct Region {
     /// The piece as scanned; every boundary vertex lies on exactly one of its loops.
     pub mesh: TriMesh,
-    /// Per vertex of the piece its vertex of the whole mesh. A vertex where the piece touches itself only in a point
-    /// appears twice.
+    /// Per vertex of the piece its vertex of the whole mesh. A vertex where the piece touches itself only in a point, or
+    /// along which it is cut open, appears twice.
     pub vertices: Vec<VertexId>,
     /// Per face of the piece its face of the whole mesh, ascending.
     pub faces: Vec<FaceId>,
@@ -30,6 +31,8 @@ pub struct Region {
     /// The reach that was used, scene units: the one asked for unless that was below three edges, beyond the mesh, or
     /// gave no disk.
     pub reach: f64,
+    /// Whether the cloth within the reach asked for was no disk: it wraps around a tube, or meets itself.
+    pub wraps: bool,
 }
 
 /// Why there is no region around a rim.
@@ -123,16 +126,18 @@ pub fn grow(
         .filter(|d| d.is_finite())
         .fold(0.0, f64::max);
     let mut reach = reach.min(farthest);
+    let mut wraps = false;
     loop {
         reach = reach.max(narrowest);
         let inside = growth.inside(reach, budget)?;
-        let shape = match cut_out(&growth, &inside, reach) {
+        let shape = match Piece::new(&growth, &inside, &CutEdges::new(), reach).disk() {
             Ok(region) => {
                 small_enough(mesh, asked, &region.vertices)?;
-                return Ok(region);
+                return Ok(Region { wraps, ..region });
             }
             Err(shape) => shape,
         };
+        wraps = true;
         if reach <= narrowest {
             return Err(RegionError::NotADisk {
                 rim: asked.id,
@@ -143,6 +148,80 @@ pub fn grow(
         }
         reach *= SHRINK;
     }
+}
+
+/// Most cuts that open a region: one for a tube, two where a tube forks.
+const CUTS: usize = 2;
+
+/// The cloth within geodesic distance `reach` (scene units) of loop `rim` where it wraps around a tube: cut open along
+/// the far side of the tube, so that it is a disk once its holes are closed. `None` where no cut makes it one.
+///
+/// # Errors
+/// As [`grow`].
+pub fn grow_cut_open(
+    whole: &BoundedMesh,
+    rim: LoopId,
+    reach: f64,
+    budget: &Budget,
+) -> Result<Option<Region>, RegionError> {
+    let Some(asked) = whole.loops.get(rim.index()) else {
+        return Err(RegionError::NoSuchLoop {
+            rim,
+            loops: whole.loops.len(),
+        });
+    };
+    small_enough(whole.mesh, asked, &asked.vertices)?;
+    let growth = Growth::new(*whole, asked, reach, budget)?;
+    let reach = reach.max(growth.narrowest);
+    let inside = growth.inside(reach, budget)?;
+    let mut cut = CutEdges::new();
+    let mut piece = Piece::new(&growth, &inside, &cut, reach);
+    for _ in 0..CUTS {
+        if piece.handles > 0 || piece.rest.len() < 2 || !add_cut(&piece, &growth, &mut cut, budget)?
+        {
+            break;
+        }
+        piece = Piece::new(&growth, &inside, &cut, reach);
+    }
+    let Ok(region) = piece.disk() else {
+        return Ok(None);
+    };
+    small_enough(whole.mesh, asked, &region.vertices)?;
+    Ok(Some(Region {
+        wraps: true,
+        ..region
+    }))
+}
+
+/// The cloth within geodesic distance `reach` (scene units, at least about three edges) of loop `rim`, whatever its
+/// shape: it may wrap around a tube, have handles and several outer loops, or none. Its `outer` is empty, and so is
+/// `holes`.
+///
+/// # Errors
+/// When the rim does not exist or a coordinate exceeds 10¹⁰⁰; `Exhausted`.
+pub fn collar(
+    whole: &BoundedMesh,
+    rim: LoopId,
+    reach: f64,
+    budget: &Budget,
+) -> Result<Region, RegionError> {
+    let Some(asked) = whole.loops.get(rim.index()) else {
+        return Err(RegionError::NoSuchLoop {
+            rim,
+            loops: whole.loops.len(),
+        });
+    };
+    small_enough(whole.mesh, asked, &asked.vertices)?;
+    let growth = Growth::new(*whole, asked, reach, budget)?;
+    let reach = reach.max(growth.narrowest);
+    let inside = growth.inside(reach, budget)?;
+    let piece = Piece::new(&growth, &inside, &CutEdges::new(), reach);
+    let region = Region {
+        holes: Vec::new(),
+        ..piece.region
+    };
+    small_enough(whole.mesh, asked, &region.vertices)?;
+    Ok(region)
 }
 
 fn small_enough(
@@ -162,96 +241,10 @@ fn small_enough(
     })
 }
 
-/// The topology of a piece that is no disk.
-struct Shape {
-    /// Handles (genus).
-    handles: usize,
-    /// Loops that are not holes.
-    outer: usize,
-}
-
-/// The faces `inside` as a mesh of its own, if it is a disk once its holes are closed.
-fn cut_out(growth: &Growth, inside: &[bool], reach: f64) -> Result<Region, Shape> {
-    let BoundedMesh { mesh, topology, .. } = growth.whole;
-    let faces: Vec<FaceId> = (0..inside.len() as u32)
-        .map(FaceId)
-        .filter(|f| inside[f.index()])
-        .collect();
-    let mut local = vec![u32::MAX; inside.len()];
-    for (l, f) in (0u32..).zip(&faces) {
-        local[f.index()] = l;
-    }
-    let to_local = |whole: HalfEdgeId| {
-        let face = FaceId(local[whole.face().index()]);
-        face.half_edges()[whole.corner()]
-    };
-    let to_whole = |local: HalfEdgeId| faces[local.face().index()].half_edges()[local.corner()];
-    let twins: Twins = faces
-        .iter()
-        .flat_map(|f| f.half_edges())
-        .map(|h| {
-            let twin = topology.twin(h).filter(|t| inside[t.face().index()]);
-            twin.map(to_local)
-        })
-        .collect();
-    let (fan, count) = twins.corner_fans();
-    let origin = |local: HalfEdgeId| VertexId(fan[local.index()]);
-    let (mut rim, mut holes, mut rest) = (Vec::new(), Vec::new(), Vec::new());
-    for cycle in twins.boundary_cycles(origin) {
-        let loop_at = |&l: &HalfEdgeId| growth.loop_at(to_whole(l));
-        let first = cycle.first().and_then(loop_at);
-        let is_whole_loop = (cycle.iter()).all(|l| loop_at(l).map(|l| l.id) == first.map(|l| l.id));
-        let vertices: Vec<u32> = cycle.iter().map(|&l| origin(l).0).collect();
-        match first.filter(|_| is_whole_loop) {
-            Some(l) if l.id == growth.rim.id => {
-                let start = growth.rim.half_edges.first();
-                let shift = cycle
-                    .iter()
-                    .position(|&l| Some(&to_whole(l)) == start)
-                    .unwrap_or(0);
-                rim = vertices;
-                rim.rotate_left(shift);
-            }
-            Some(l) if l.is_surrounded() => holes.push(vertices),
-            _ => rest.push(vertices),
-        }
-    }
-    // χ = V − E + F = 2 − 2g − (loops); every edge has two half-edges or one and a boundary.
-    let boundary = twins.boundary().count();
-    let loop_count = holes.len() + rest.len() + usize::from(!rim.is_empty());
-    let euler = count as i64 - (twins.len() + boundary) as i64 / 2 + faces.len() as i64;
-    let handles = ((2 - loop_count as i64 - euler) / 2).max(0) as usize;
-    let shape = Shape {
-        handles,
-        outer: rest.len(),
-    };
-    let outer = match rest.pop() {
-        Some(outer) if rest.is_empty() && handles == 0 && !rim.is_empty() => outer,
-        _ => return Err(shape),
-    };
-    let mut vertices = vec![VertexId(0); count];
-    for (l, &v) in (0u32..).map(HalfEdgeId).zip(&fan) {
-        vertices[v as usize] = topology.origin(to_whole(l));
-    }
-    let positions = vertices.iter().map(|v| mesh.positions[v.index()]).collect();
-    let (triangles, _) = fan.as_chunks::<3>();
-    Ok(Region {
-        mesh: TriMesh {
-            positions,
-            faces: triangles.to_vec(),
-        },
-        vertices,
-        faces,
-        rim,
-        holes,
-        outer,
-        reach,
-    })
-}
-
 /// The region of this reach around the first hole of a welded mesh, for tests.
 #[cfg(test)]
 pub(crate) fn region_around_hole(mesh: &TriMesh, reach: f64) -> Region {
+    use super::loops::LoopKind;
     let topology = Topology::new(mesh);
     let loops = super::loops::boundary_loops(mesh, &topology);
     let hole = loops.iter().find(|l| l.is_surrounded());
@@ -392,6 +385,30 @@ mod tests {
                 prop_assert!(at_the_border || outside(p) > 0.9 * reach - 2.0 * edge);
             }
         }
+    }
+
+    #[test]
+    fn cloth_around_a_tube_is_cut_open_on_the_far_side() {
+        // A hole of 60 % of the circumference; the cut lies opposite, at u = 0.
+        let keep = |u: f64, v: f64| (u - 0.5).abs() > 0.3 || (v - 0.5).abs() > 0.1;
+        let whole = Whole::new(&tube(40, keep));
+        let reach = 1.4;
+        let shrunk = whole.grow(reach).expect("a narrow region");
+        assert!(shrunk.wraps && shrunk.reach < reach);
+        let bounded = BoundedMesh {
+            mesh: &whole.mesh,
+            topology: &whole.topology,
+            loops: &whole.loops,
+        };
+        let open = grow_cut_open(&bounded, whole.hole().id, reach, Budget::unlimited());
+        let open = open.expect("a tube").expect("a cut");
+        assert!(open.reach == reach && open.faces.len() > shrunk.faces.len());
+        let twice: Vec<Vec3> = (open.vertices.iter().zip(&open.mesh.positions))
+            .filter(|(v, _)| open.vertices.iter().filter(|w| w == v).count() > 1)
+            .map(|(_, p)| *p)
+            .collect();
+        assert!(!twice.is_empty());
+        assert!(twice.iter().all(|p| p.x > 0.9), "{twice:?}");
     }
 
     #[test]

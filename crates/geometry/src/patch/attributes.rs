@@ -5,16 +5,16 @@
 //! the values of one island. Two faces belong to one island when their columns agree at common points, even when they
 //! share no vertices.
 
+mod affine;
+
 use std::collections::{BTreeMap, BTreeSet};
 
 use darn_budget::{Budget, Exhausted};
-use nalgebra::{DMatrix, Matrix3};
 
+use super::Patch;
 use super::harmonic::HarmonicExtension;
-use super::{Patch, PatchPlan};
 use crate::cholesky::SolveError;
 use crate::flatten::Chart;
-use crate::mesh::Vec2;
 use crate::mesh::region::Region;
 
 /// The scan's attributes around a hole, as columns of numbers.
@@ -51,22 +51,48 @@ pub struct AttributedPatch {
     pub faces: Vec<[u32; 3]>,
 }
 
-/// Extends the scan's attributes into a patch; `plan` must be the plan that made it.
+/// How attributes are continued from the rim into a patch.
+pub struct AttributeMap<'a> {
+    /// The harmonic extension from the whole rim.
+    rim_extension: &'a HarmonicExtension,
+    /// The chart of the patch; without one there is no affine fit.
+    chart: Option<&'a Chart>,
+}
+
+impl<'a> AttributeMap<'a> {
+    /// For a patch in a chart.
+    pub(super) fn on_chart(rim_extension: &'a HarmonicExtension, chart: &'a Chart) -> Self {
+        let chart = Some(chart);
+        AttributeMap {
+            rim_extension,
+            chart,
+        }
+    }
+
+    /// For a patch in space.
+    pub(super) fn on_surface(rim_extension: &'a HarmonicExtension) -> Self {
+        AttributeMap {
+            rim_extension,
+            chart: None,
+        }
+    }
+}
+
+/// Extends the scan's attributes into a patch; `map` must be of the plan or fair patch that it comes from.
 ///
 /// # Errors
 /// `Exhausted`: every texture island at the rim is extended over the whole patch.
 pub fn extend_attributes(
-    plan: &PatchPlan,
+    map: &AttributeMap,
     patch: &Patch,
     region: &Region,
-    chart: &Chart,
     columns: &Columns,
 ) -> Result<AttributedPatch, Exhausted> {
     let corners = shared_corners(region, columns);
     let islands = islands(&corners, columns.width);
     let around = RimAttributes {
         columns,
-        rim_extension: plan.rim_extension(),
+        map,
         rim: rim_edges(patch, region, columns, &islands),
         corners,
         islands,
@@ -82,7 +108,7 @@ pub fn extend_attributes(
     let faces = face_labels(patch, &around, &labels);
     let extended: BTreeMap<u32, Vec<Vec<f64>>> = labels
         .iter()
-        .map(|l| Ok((*l, extend_island(*l, patch, region, chart, &around)?)))
+        .map(|l| Ok((*l, extend_island(*l, patch, region, &around)?)))
         .collect::<Result<_, Exhausted>>()?;
 
     let mut index = BTreeMap::new();
@@ -121,8 +147,7 @@ const VALUE_WORK: u64 = 300;
 /// The attributes around a hole with their texture islands.
 struct RimAttributes<'a> {
     columns: &'a Columns<'a>,
-    /// The harmonic extension from the whole rim.
-    rim_extension: &'a HarmonicExtension,
+    map: &'a AttributeMap<'a>,
     /// The scan's side of every rim edge, in the order of the patch's rim; `None` where the face there has other
     /// attributes.
     rim: Vec<Option<RimEdge>>,
@@ -271,8 +296,8 @@ fn face_labels(patch: &Patch, around: &RimAttributes, labels: &[u32]) -> Vec<Opt
             let at_rim: Vec<[f64; 1]> = (0..rim.len())
                 .map(|k| [0.5 * (on(k) + on(k + rim.len() - 1))])
                 .collect();
-            around.rim_extension.extend(&at_rim).map_or_else(
-                |_| vec![0.0; patch.flat.len()],
+            around.map.rim_extension.extend(&at_rim).map_or_else(
+                |_| vec![0.0; patch.positions.len()],
                 |x| x.into_iter().map(|[x]| x).collect(),
             )
         })
@@ -296,46 +321,36 @@ fn face_labels(patch: &Patch, around: &RimAttributes, labels: &[u32]) -> Vec<Opt
         .collect()
 }
 
-/// One island's columns at every patch vertex: an affine map of the chart plus the harmonic extension of the residual
-/// at the rim.
+/// One island's columns at every patch vertex: an affine map of the chart, if there is one, plus the harmonic extension
+/// of the residual at the rim.
 fn extend_island(
     label: u32,
     patch: &Patch,
     region: &Region,
-    chart: &Chart,
     around: &RimAttributes,
 ) -> Result<Vec<Vec<f64>>, Exhausted> {
     let (columns, rim) = (around.columns, &around.rim);
     let budget = columns.budget;
     budget.spend(FACE_WORK * region.mesh.faces.len() as u64)?;
-    budget.spend(VALUE_WORK * (columns.width * patch.flat.len()) as u64)?;
-    budget.hold((size_of::<Vec<f64>>() + 8 * columns.width) * patch.flat.len())?;
-    let mut samples: Vec<(u32, Vec2)> = Vec::new();
-    let faces = region.mesh.faces.iter().zip(&around.corners);
-    for ((face, corners), island) in faces.zip(&around.islands) {
-        if let Some(corners) = corners.filter(|_| *island == Some(label)) {
-            let flat = face.map(|v| chart.flat[v as usize]);
-            samples.extend(corners.into_iter().zip(flat));
-        }
-    }
-    samples.sort_by_key(|(scan, _)| *scan);
-    samples.dedup_by_key(|(scan, _)| *scan);
-    let fit = affine_fit(&samples, columns, patch);
-    let at = |p: &Vec2| -> Vec<f64> {
-        (0..columns.width)
-            .map(|c| fit[(0, c)] + fit[(1, c)] * p.x + fit[(2, c)] * p.y)
-            .collect()
+    let count = patch.positions.len();
+    budget.spend(VALUE_WORK * (columns.width * count) as u64)?;
+    budget.hold((size_of::<Vec<f64>>() + 8 * columns.width) * count)?;
+    let mut values = match around.map.chart {
+        Some(chart) => affine::values(label, patch, region, chart, around),
+        None => vec![vec![0.0; columns.width]; count],
     };
     let held: Vec<(u32, u32)> = (0..rim.len() as u32)
         .filter_map(|k| Some((k, scan_vertex(rim, k, label)?)))
         .collect();
     let vertices: Vec<u32> = held.iter().map(|(k, _)| *k).collect();
-    let mut values: Vec<Vec<f64>> = patch.flat.iter().map(&at).collect();
     let from_part;
     let extension = if vertices.len() == rim.len() {
-        Ok(around.rim_extension)
+        Ok(around.map.rim_extension)
     } else {
-        from_part = HarmonicExtension::new(&patch.flat, &patch.faces, &vertices, budget);
+        from_part = match around.map.chart {
+            Some(_) => HarmonicExtension::new(&patch.flat, &patch.faces, &vertices, budget),
+            None => HarmonicExtension::on_surface(&patch.mesh(), &vertices, budget),
+        };
         from_part.as_ref()
     };
     if let Err(SolveError::Exhausted(exhausted)) = extension {
@@ -362,44 +377,6 @@ fn extend_island(
         }
     }
     Ok(values)
-}
-
-/// Least-squares affine map from the chart to the columns, [3, width]: rows constant, x, y. Samples near the hole have
-/// the largest weights.
-fn affine_fit(samples: &[(u32, Vec2)], columns: &Columns, patch: &Patch) -> DMatrix<f64> {
-    let rim = patch.rim.len() as f64;
-    let centre = patch.flat.iter().take(patch.rim.len()).sum::<Vec2>() / rim;
-    let size = patch
-        .flat
-        .iter()
-        .take(patch.rim.len())
-        .map(|p| (p - centre).norm_squared())
-        .sum::<f64>()
-        / rim;
-    let mut normal = Matrix3::zeros();
-    let mut rhs = nalgebra::Matrix3xX::zeros(columns.width);
-    for (scan, p) in samples {
-        let d = (p - centre) / size.sqrt().max(f64::MIN_POSITIVE);
-        let weight = (-d.norm_squared()).exp() + 1e-6;
-        let row = nalgebra::Vector3::new(1.0, d.x, d.y);
-        normal += row * row.transpose() * weight;
-        for (c, value) in (columns.values)(*scan).iter().enumerate() {
-            (0..3).for_each(|r| rhs[(r, c)] += weight * row[r] * value);
-        }
-    }
-    // A small ridge term: samples on one line leave one slope open, which becomes zero.
-    normal += Matrix3::from_diagonal(&nalgebra::Vector3::new(0.0, 1e-9, 1e-9))
-        * normal.trace().max(f64::MIN_POSITIVE);
-    let solution = normal.try_inverse().map_or_else(
-        || DMatrix::zeros(3, columns.width),
-        |inverse| DMatrix::from_fn(3, columns.width, |r, c| (inverse * rhs.column(c))[r]),
-    );
-    // From centred, scaled coordinates back to the chart's.
-    let scale = size.sqrt().max(f64::MIN_POSITIVE);
-    DMatrix::from_fn(3, columns.width, |r, c| match r {
-        0 => solution[(0, c)] - (solution[(1, c)] * centre.x + solution[(2, c)] * centre.y) / scale,
-        _ => solution[(r, c)] / scale,
-    })
 }
 
 #[cfg(test)]
@@ -450,7 +427,7 @@ mod tests {
             width: texture[0].len(),
             budget: Budget::unlimited(),
         };
-        extend_attributes(&plan, &patch, &region, &chart, &columns).unwrap()
+        extend_attributes(&plan.attribute_map(&chart), &patch, &region, &columns).unwrap()
     }
 
     #[test]

@@ -8,7 +8,6 @@ use darn_budget::{Budget, Exhausted};
 
 use super::Patch;
 use super::intersections::intersections_from;
-use super::triangulate::Triangulation;
 use crate::mesh::region::Region;
 use crate::mesh::{TriMesh, Vec3};
 
@@ -27,7 +26,7 @@ pub(super) struct CollisionMesh {
     mean_edge: f64,
 }
 
-/// An edge with its length in the chart, scene units.
+/// An edge with the length that it should have, scene units.
 #[derive(Debug, Clone)]
 struct RestEdge {
     from: u32,
@@ -52,26 +51,31 @@ const SWEEPS: usize = 4;
 const GIVE: f64 = 0.03;
 
 impl CollisionMesh {
-    /// The region with the patch that closes its hole; `rim` holds the region vertices of the hole's polygon.
-    pub fn new(rim: &[u32], triangulation: &Triangulation, region: &Region) -> CollisionMesh {
+    /// The region with the patch that closes its hole; `rim` holds the region vertices of the patch's first vertices,
+    /// `length` gives the length that an edge of the patch should have, scene units.
+    pub fn new(
+        rim: &[u32],
+        patch_faces: &[[u32; 3]],
+        length: impl Fn(u32, u32) -> f64,
+        region: &Region,
+    ) -> CollisionMesh {
         let base = region.mesh.positions.len() as u32;
         let corners = rim.len() as u32;
         let vertex = |v: u32| rim.get(v as usize).copied().unwrap_or(base + v - corners);
         let mut faces = region.mesh.faces.clone();
-        faces.extend(triangulation.faces.iter().map(|f| f.map(vertex)));
-        let mut edges: Vec<(u32, u32)> = (triangulation.faces.iter())
+        faces.extend(patch_faces.iter().map(|f| f.map(vertex)));
+        let mut edges: Vec<(u32, u32)> = (patch_faces.iter())
             .flat_map(|f| [(f[0], f[1]), (f[1], f[2]), (f[2], f[0])])
             .map(|(a, b)| (a.min(b), a.max(b)))
             .filter(|(_, b)| *b >= corners)
             .collect();
         edges.sort_unstable();
         edges.dedup();
-        let at = |v: u32| triangulation.points[v as usize];
         let edges: Vec<RestEdge> = (edges.into_iter())
             .map(|(a, b)| RestEdge {
                 from: vertex(a),
                 to: vertex(b),
-                length: (at(a) - at(b)).norm(),
+                length: length(a, b),
             })
             .collect();
         CollisionMesh {

@@ -5,7 +5,7 @@ use darn_budget::Budget;
 
 use crate::cholesky::{Factor, SolveError, Symmetric};
 use crate::flatten::RestTriangle;
-use crate::mesh::Vec2;
+use crate::mesh::{TriMesh, Vec2};
 
 /// The factored cotangent Laplacian of a patch for one set of held vertices.
 pub(super) struct HarmonicExtension {
@@ -41,7 +41,39 @@ impl HarmonicExtension {
         held: &[u32],
         budget: &Budget,
     ) -> Result<HarmonicExtension, SolveError> {
-        let mut role = vec![Role::Free(0); flat.len()];
+        let rest = |f: &[u32; 3]| RestTriangle::from_corners(f.map(|v| flat[v as usize]));
+        let rest: Vec<RestTriangle> = faces.iter().map(rest).collect();
+        Self::over(&rest, faces, flat.len(), held, budget)
+    }
+
+    /// The same over a surface in space.
+    ///
+    /// # Errors
+    /// As [`HarmonicExtension::new`].
+    pub fn on_surface(
+        surface: &TriMesh,
+        held: &[u32],
+        budget: &Budget,
+    ) -> Result<HarmonicExtension, SolveError> {
+        let count = surface.positions.len();
+        Self::over(
+            &RestTriangle::of(surface),
+            &surface.faces,
+            count,
+            held,
+            budget,
+        )
+    }
+
+    /// The same over faces of these shapes.
+    fn over(
+        rest: &[RestTriangle],
+        faces: &[[u32; 3]],
+        vertices: usize,
+        held: &[u32],
+        budget: &Budget,
+    ) -> Result<HarmonicExtension, SolveError> {
+        let mut role = vec![Role::Free(0); vertices];
         held.iter()
             .enumerate()
             .for_each(|(k, v)| role[*v as usize] = Role::Held(k));
@@ -54,8 +86,7 @@ impl HarmonicExtension {
         }
         let mut matrix = Symmetric::zero(free);
         let mut couplings = Vec::new();
-        for face in faces {
-            let rest = RestTriangle::from_corners(face.map(|v| flat[v as usize]));
+        for (face, rest) in faces.iter().zip(rest) {
             for k in 0..3 {
                 let weight = (0.5 * rest.cotangent[k]).max(LEAST_WEIGHT);
                 match (role[face[k] as usize], role[face[(k + 1) % 3] as usize]) {

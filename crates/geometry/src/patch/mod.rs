@@ -4,6 +4,7 @@
 //! Stages: `triangulate` → positions from the grid → `harmonic` (closes the seam) → `strain` (limits strain, with
 //! `forces` for pulls) → `collisions` → [`quality`]. `plan` calls them in order, first those that depend on the hole
 //! alone, then those that depend on the grid. [`attributes`] continues texture coordinates and colours into the patch.
+//! A hole without a chart gets a [`FairPatch`].
 //!
 //! Reads no glTF (the scan's attributes come as columns of numbers) and calls no network; any grid will do.
 
@@ -13,6 +14,7 @@ mod bending;
 mod collisions;
 mod deformation;
 mod energy;
+mod fair;
 mod forces;
 mod harmonic;
 mod intersections;
@@ -29,6 +31,7 @@ mod triangulate;
 mod untangle;
 
 pub use energy::StrainOptions;
+pub use fair::FairPatch;
 pub use metric::{PatchMetric, log_stretch};
 pub use plan::{PatchMesh, PatchPlan, plan, stretch_limit};
 pub use pull::{Firmness, Pull};
@@ -39,7 +42,7 @@ use darn_budget::{Budget, Exhausted};
 use crate::cholesky::SolveError;
 use crate::flatten::Chart;
 use crate::mesh::region::Region;
-use crate::mesh::{Vec2, Vec3};
+use crate::mesh::{TriMesh, Vec2, Vec3};
 
 /// Why a hole could not be patched.
 #[derive(Debug, thiserror::Error, PartialEq)]
@@ -111,7 +114,7 @@ pub struct Patch {
     /// Region vertices of the rim, counter-clockwise around the patch; they are the patch's first vertices. Where the
     /// rim touches itself, several of them lie at one point and the patch consists of pieces that meet there.
     pub rim: Vec<u32>,
-    /// All vertices in the plane of the chart, scene units.
+    /// All vertices in the plane of the chart, scene units; empty for a patch without a chart.
     pub flat: Vec<Vec2>,
     /// All vertices in scene space; those of the rim lie at the region's positions.
     pub positions: Vec<Vec3>,
@@ -126,6 +129,23 @@ pub struct Patch {
 }
 
 impl Patch {
+    /// Its triangles.
+    pub fn mesh(&self) -> TriMesh {
+        TriMesh {
+            positions: self.positions.clone(),
+            faces: self.faces.clone(),
+        }
+    }
+
+    /// The largest distance of its vertices from the box of its rim, per axis; scene units.
+    pub fn beyond_rim(&self) -> f64 {
+        let rim = || self.positions[..self.rim.len()].iter();
+        let low = rim().fold(Vec3::repeat(f64::MAX), |m, p| m.inf(p));
+        let high = rim().fold(Vec3::repeat(f64::MIN), |m, p| m.sup(p));
+        let beyond = |p: &Vec3| (low - p).sup(&(p - high)).max();
+        self.positions.iter().map(beyond).fold(0.0, f64::max)
+    }
+
     /// The position, scene space, at a point in the plane of the chart: barycentric in its triangle, or that of the
     /// nearest vertex where the point lies beside the patch. O(faces).
     pub fn at(&self, p: Vec2) -> Vec3 {

@@ -6,10 +6,12 @@ mod pieces;
 
 pub use anchors::stretch_limit;
 
+pub(super) use pieces::rim_pieces;
 use pieces::{Asked, RimPoints, triangulate_pieces};
 
 use darn_budget::{Budget, Exhausted};
 
+use super::attributes::AttributeMap;
 use super::collisions::CollisionMesh;
 use super::energy::StrainEnergy;
 use super::harmonic::HarmonicExtension;
@@ -135,7 +137,15 @@ impl PatchMesh {
             .map_err(PatchError::of_stage("strain"))?;
         Ok(PatchPlan {
             rim_positions: positions_of(&rim, &region.mesh),
-            collisions: CollisionMesh::new(&rim, &triangulation, region),
+            collisions: CollisionMesh::new(
+                &rim,
+                &triangulation.faces,
+                |a, b| {
+                    let [a, b] = [a, b].map(|v| triangulation.points[v as usize]);
+                    (a - b).norm()
+                },
+                region,
+            ),
             rim,
             shift: None,
             triangulation,
@@ -195,9 +205,9 @@ impl PatchPlan {
         all.separate(patch, budget)
     }
 
-    /// The harmonic extension from the rim to all vertices.
-    pub(super) fn rim_extension(&self) -> &HarmonicExtension {
-        &self.rim_extension
+    /// How attributes are continued into the patches of this plan; `chart` must be the plan's.
+    pub fn attribute_map<'a>(&'a self, chart: &'a Chart) -> AttributeMap<'a> {
+        AttributeMap::on_chart(&self.rim_extension, chart)
     }
 
     /// How many vertices are not on the rim.

@@ -9,7 +9,7 @@ use crate::mesh::region::Region;
 pub struct Quality {
     /// Area, scene units squared.
     pub area: f64,
-    /// Mean of length ÷ length in the chart over the edges with an inner vertex; 1 without such edges.
+    /// Mean of length ÷ length in the chart over the edges with an inner vertex; 1 without such edges or a chart.
     pub stretch_mean: f64,
     /// Maximum of the same.
     pub stretch_max: f64,
@@ -21,22 +21,23 @@ pub struct Quality {
     pub self_intersections: usize,
 }
 
-/// Measures a patch against its chart and the region it closes.
+/// Measures a patch against its chart, if it has one, and the region it closes.
 pub fn measure(patch: &Patch, region: &Region) -> Quality {
     let (mut edges, mut sum, mut most) = (0usize, 0.0, 0.0f64);
     let mut area = 0.0;
     let mut angles = vec![0.0; patch.positions.len()];
     for face in &patch.faces {
         let p = face.map(|v| patch.positions[v as usize]);
-        let flat = face.map(|v| patch.flat[v as usize]);
+        let flat = face.map(|v| patch.flat.get(v as usize));
         area += 0.5 * (p[1] - p[0]).cross(&(p[2] - p[0])).norm();
         for k in 0..3 {
             let (next, last) = ((k + 1) % 3, (k + 2) % 3);
             let (to_next, to_last) = (p[next] - p[k], p[last] - p[k]);
             angles[face[k] as usize] += to_next.cross(&to_last).norm().atan2(to_next.dot(&to_last));
             // The scan sets the length of an edge between two rim vertices.
-            if face[k].max(face[next]) as usize >= patch.rim.len() {
-                let stretch = to_next.norm() / (flat[next] - flat[k]).norm().max(f64::MIN_POSITIVE);
+            let is_inner = face[k].max(face[next]) as usize >= patch.rim.len();
+            if let (true, Some(to), Some(from)) = (is_inner, flat[next], flat[k]) {
+                let stretch = to_next.norm() / (to - from).norm().max(f64::MIN_POSITIVE);
                 sum += stretch;
                 most = most.max(stretch);
                 edges += 1;

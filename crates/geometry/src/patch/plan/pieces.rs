@@ -27,11 +27,7 @@ pub(super) struct RimPoints {
 impl RimPoints {
     /// The points of a rim whose vertices lie at `rim` on the scan.
     pub fn new(rim: &[Vec3], scan: &TriMesh) -> RimPoints {
-        let mut first = HashMap::new();
-        let line: Vec<u32> = (0u32..)
-            .zip(rim)
-            .map(|(k, p)| *first.entry(bits(p)).or_insert(k))
-            .collect();
+        let (line, first) = points_of(rim);
         let low = rim.iter().fold(Vec3::repeat(f64::MAX), |m, p| m.inf(p));
         let high = rim.iter().fold(Vec3::repeat(f64::MIN), |m, p| m.sup(p));
         // The box test spares a look-up for most of the scan.
@@ -72,6 +68,22 @@ impl RimPoints {
         self.joined.extend(own);
         Ok(())
     }
+}
+
+/// The point of every vertex along a rim that lies at `rim`: the index of the first vertex there; and that index by
+/// position.
+fn points_of(rim: &[Vec3]) -> (Vec<u32>, HashMap<[u64; 3], u32>) {
+    let mut first = HashMap::new();
+    let line = (0u32..)
+        .zip(rim)
+        .map(|(k, p)| *first.entry(bits(p)).or_insert(k))
+        .collect();
+    (line, first)
+}
+
+/// The pieces that a rim bounds where it touches itself, each as the rim's vertices around it; one piece otherwise.
+pub(in crate::patch) fn rim_pieces(rim: &[Vec3]) -> Vec<Vec<usize>> {
+    simple_pieces(&points_of(rim).0)
 }
 
 /// The key of a position; −0 equals 0, as in welding.

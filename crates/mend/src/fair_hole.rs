@@ -1,0 +1,131 @@
+//! A hole that has no chart: what cannot be laid flat gets a fair surface in space, without the network and without
+//! constraints.
+
+use std::time::Instant;
+
+use crate::error::MendError;
+use crate::fill_hole::PatchDraft;
+use crate::mender::Call;
+use crate::prepared_hole::HoleRef;
+use crate::select::HoleRequest;
+use crate::timings::milliseconds;
+use crate::welded_scan::WeldedScan;
+use darn_contract::{FieldError, v1};
+use darn_geometry::mesh::denoise::denoise;
+use darn_geometry::mesh::index::LoopId;
+use darn_geometry::mesh::layers::layers_near;
+use darn_geometry::mesh::region::{self, Region};
+use darn_geometry::patch::{FairPatch, PatchWork};
+
+/// Nanoseconds of work a face of the scan in the search for other layers near a hole.
+const LAYERS_WORK: u64 = 10;
+
+/// A hole without a chart, and the fair surface that closes it.
+pub struct FairHole {
+    /// The loop's id.
+    pub id: u32,
+    /// The cloth next to its rim.
+    pub region: Region,
+    /// What closes it.
+    pub fair: FairPatch,
+    /// Why there is no chart, for a person.
+    pub reason: String,
+    /// Milliseconds of preparing the hole.
+    pub timings: v1::HoleTimings,
+    /// Whether the surface continues the cloth without the scanner's noise.
+    pub denoised: bool,
+}
+
+impl FairHole {
+    /// Closes the hole of a loop with a fair surface.
+    ///
+    /// # Errors
+    /// `Region` or `Patch`, whichever stage fails; `Exhausted`.
+    pub fn new(
+        welded: &WeldedScan,
+        id: u32,
+        reason: String,
+        call: Call,
+    ) -> Result<FairHole, MendError> {
+        let (started, budget) = (Instant::now(), call.budget);
+        let scan = &welded.surface.mesh;
+        let region = region::collar(&welded.bounded(), LoopId(id), 0.0, budget)
+            .map_err(MendError::region(id))?;
+        let region_ms = milliseconds(started);
+        let started = Instant::now();
+        let smooth = denoise(&region.mesh, budget)?.map(|mesh| Region {
+            mesh,
+            ..region.clone()
+        });
+        let work = PatchWork {
+            options: &call.mender.limits.patch,
+            budget,
+        };
+        let seen = smooth.as_ref().unwrap_or(&region);
+        let fair = FairPatch::new(seen, work)
+            .and_then(|fair| match &smooth {
+                Some(_) => fair.with_region_at(&region.mesh.positions),
+                None => Ok(fair),
+            })
+            .map_err(MendError::patch(id))?;
+        budget.spend(LAYERS_WORK * scan.faces.len() as u64)?;
+        // No point of the patch is farther from the rim than this.
+        let margin = fair.patch.beyond_rim();
+        let fair = fair.clear_of(&layers_near(scan, &region, margin), budget)?;
+        let hole = FairHole {
+            id,
+            denoised: smooth.is_some(),
+            timings: v1::HoleTimings {
+                region: region_ms,
+                patch: milliseconds(started),
+                ..v1::HoleTimings::default()
+            },
+            region,
+            fair,
+            reason,
+        };
+        budget.hold(hole.bytes())?;
+        Ok(hole)
+    }
+
+    /// The patch that a request asks for.
+    ///
+    /// # Errors
+    /// `Constraints` for every anchor and gesture of the request: they need a chart.
+    pub fn fill(&self, request: &HoleRequest) -> Result<PatchDraft<'_>, MendError> {
+        let anchors = request.anchors.iter().map(|a| ("anchors", a.index));
+        let edits = request.edits.iter().map(|e| ("edits", e.index));
+        let wrong = anchors.chain(edits);
+        let wrong: Vec<FieldError> = wrong
+            .map(|(list, index)| self.no_chart(format!("/{list}/{index}")))
+            .collect();
+        if !wrong.is_empty() {
+            return Err(MendError::Constraints(wrong));
+        }
+        Ok(PatchDraft {
+            hole: HoleRef::Fair(self),
+            patch: self.fair.patch.clone(),
+            network_share: 0.0,
+            edited: false,
+            constraints: None,
+            timings: self.timings,
+        })
+    }
+
+    /// The error of something that needs a chart.
+    pub fn no_chart(&self, pointer: impl Into<String>) -> FieldError {
+        let detail = format!(
+            "hole {} has no chart, so there is no uv on it ({}); it takes no anchors and no gestures",
+            self.id, self.reason
+        );
+        FieldError::new(pointer, detail)
+    }
+
+    /// Bytes of memory that it holds, estimated.
+    pub fn bytes(&self) -> usize {
+        24 * self.region.mesh.positions.len()
+            + 16 * self.region.mesh.faces.len()
+            + 4 * self.region.vertices.len()
+            + self.fair.bytes()
+    }
+}

@@ -1,0 +1,151 @@
+//! Holes in tubes: sleeves with folds, cut open and laid flat; and what no chart can lay out.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use darn_budget::Budget;
+use darn_contract::{Anchor, Constraints, Edit, Gesture};
+use darn_geometry::mesh::curvature::face_areas;
+use darn_geometry::mesh::loops::LoopKind;
+use darn_geometry::mesh::shapes::sheet;
+use darn_geometry::mesh::weld::weld;
+use darn_geometry::mesh::{TriMesh, Vec3};
+use darn_mend::ScanSession;
+
+use super::cloth::{MendedScan, mended, mender, packed, read};
+
+/// Height of a sleeve; its radius is about 1.
+const HEIGHT: f64 = 3.2;
+
+/// A sleeve whose radius at (angle, height) is 1 plus `fold` there; squares for which `keep(u, v)` is false are left out.
+fn sleeve(keep: impl Fn(f64, f64) -> bool, fold: impl Fn(f64, f64) -> f64) -> TriMesh {
+    let place = |u: f64, v: f64| {
+        let (angle, z) = (if u == 1.0 { 0.0 } else { TAU * u }, HEIGHT * v);
+        let radius = 1.0 + fold(angle, z);
+        Vec3::new(radius * angle.cos(), radius * angle.sin(), z)
+    };
+    weld(&sheet(72, keep, place)).mesh
+}
+
+/// Everything but a hole that takes this share of the circumference and a quarter of the height.
+fn around(share: f64) -> impl Fn(f64, f64) -> bool {
+    move |u, v| (2.0 * (u - 0.5) / share).powi(4) + (8.0 * (v - 0.5)).powi(4) > 1.0
+}
+
+fn folds(kind: &str) -> fn(f64, f64) -> f64 {
+    match kind {
+        "along" => |angle, _| 0.05 * (8.0 * angle).sin(),
+        "spiral" => |angle, z| 0.05 * (6.0 * angle + 6.0 * z).sin(),
+        "rings" => |_, z| 0.05 * (8.0 * z).sin(),
+        _ => |_, _| 0.0,
+    }
+}
+
+#[test]
+fn holes_in_sleeves_are_closed_close_to_the_truth() {
+    for kind in ["smooth", "along", "spiral", "rings"] {
+        let fold = folds(kind);
+        for share in [0.15, 0.35, 0.6] {
+            let keep = around(share);
+            let bytes = packed(&sleeve(&keep, fold), &[]);
+            let done = mended(&bytes, &Constraints::default()).expect("a sleeve");
+            let [hole] = &done.report.holes[..] else {
+                panic!("one hole, not {}", done.report.holes.len());
+            };
+            assert!(hole.chart.is_some(), "{kind} {share}: {:?}", hole.notes);
+            let seen = MendedScan::of(&done.bytes);
+            let new = seen.new_positions();
+            let off = |p: &Vec3| {
+                let angle = p.y.atan2(p.x);
+                (p.xy().norm() - 1.0 - fold(angle, p.z)).abs()
+            };
+            let mean = new.iter().map(off).sum::<f64>() / new.len() as f64;
+            // The folds are 0.05 high: a lid through their middle is 0.03 off.
+            assert!(mean < 0.03, "{kind} {share}: {mean}");
+            let missing = sleeve(|u, v| !keep(u, v), fold);
+            let truth: f64 = face_areas(&missing).iter().sum();
+            let share_of_truth = seen.patch_area() / truth;
+            assert!(
+                (0.9..1.1).contains(&share_of_truth),
+                "{kind} {share}: {share_of_truth}"
+            );
+        }
+    }
+}
+
+/// A sleeve with a hole all round, but for a bridge one square wide.
+fn nearly_cut_through() -> Vec<u8> {
+    let keep = |u: f64, v: f64| (v - 0.5).abs() > 0.1 || u < 1.0 / 72.0;
+    packed(&sleeve(keep, |_, _| 0.0), &[])
+}
+
+#[test]
+fn a_hole_without_a_chart_gets_a_fair_surface_and_the_report_says_so() {
+    let bytes = nearly_cut_through();
+    let done = mended(&bytes, &Constraints::default()).expect("a fair surface");
+    let [hole] = &done.report.holes[..] else {
+        panic!("one hole, not {}", done.report.holes.len());
+    };
+    let patch = hole.patch.as_ref().expect("a patch");
+    assert_eq!((patch.method.as_str(), patch.network_share), ("fair", 0.0));
+    assert!(hole.chart.is_none() && hole.grid.is_none());
+    assert!(
+        hole.notes.iter().any(|n| n.contains("cannot be laid flat")),
+        "{:?}",
+        hole.notes
+    );
+    assert_eq!(patch.self_intersections, 0);
+    let seen = MendedScan::of(&done.bytes);
+    assert!(seen.loops.iter().all(|l| l.kind != LoopKind::Hole));
+    for p in seen.new_positions() {
+        let radius = p.xy().norm();
+        assert!((radius - 1.0).abs() < 0.05, "{radius}");
+    }
+    // The same bytes every time.
+    let again = mended(&bytes, &Constraints::default()).expect("a fair surface");
+    assert!(again.bytes == done.bytes);
+}
+
+#[test]
+fn anchors_and_gestures_on_a_hole_without_a_chart_are_refused_by_their_pointers() {
+    let asked = Constraints {
+        anchors: vec![Anchor {
+            hole: None,
+            uv: None,
+            position: [-1.0, 0.0, 1.6],
+            hard: false,
+        }],
+        edits: vec![Edit {
+            hole: None,
+            gesture: Gesture::Grab {
+                uv: [0.5, 0.5],
+                offset: [0.0, 0.0, 0.1],
+            },
+        }],
+        ..Constraints::default()
+    };
+    let error = mended(&nearly_cut_through(), &asked).expect_err("a refusal");
+    assert_eq!(error.code(), darn_contract::codes::CONSTRAINTS_DO_NOT_FIT);
+    let pointers: Vec<String> = error.fields().into_iter().map(|f| f.pointer).collect();
+    assert_eq!(pointers, ["/anchors/0", "/edits/0"]);
+}
+
+#[test]
+fn a_session_holds_a_hole_without_a_chart() {
+    let scan = read(&nearly_cut_through());
+    let never = Budget::unlimited();
+    let opening = Constraints::default();
+    let session =
+        ScanSession::open(scan, &opening, Arc::clone(mender()), never).expect("a session");
+    let described = session.described();
+    let [hole] = &described.holes[..] else {
+        panic!("one hole, not {}", described.holes.len());
+    };
+    assert!(!hole.rim_positions.is_empty() && !hole.patch_faces.is_empty());
+    assert!(
+        hole.grid_positions.is_empty() && hole.patch_uvs.is_empty() && hole.chart_png.is_empty()
+    );
+    let kept = session.call(never).mended(&opening).expect("a patch");
+    let single = mended(&nearly_cut_through(), &opening).expect("a patch");
+    assert!(kept.bytes == single.bytes);
+}
