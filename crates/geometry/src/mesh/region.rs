@@ -244,7 +244,6 @@ fn small_enough(
 /// The region of this reach around the first hole of a welded mesh, for tests.
 #[cfg(test)]
 pub(crate) fn region_around_hole(mesh: &TriMesh, reach: f64) -> Region {
-    use super::loops::LoopKind;
     let topology = Topology::new(mesh);
     let loops = super::loops::boundary_loops(mesh, &topology);
     let hole = loops.iter().find(|l| l.is_surrounded());
