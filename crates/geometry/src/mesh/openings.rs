@@ -219,7 +219,12 @@ impl<'a> Piece<'a> {
             3.0 * smoothness * believed,
         );
         if rim.corners > HEM_CORNERS {
-            add(EvidenceKind::Corners, rim.corners as f64, -2.5);
+            let beyond = (rim.corners - HEM_CORNERS).min(3) as f64;
+            add(
+                EvidenceKind::Corners,
+                rim.corners as f64,
+                -1.5 - 1.5 * beyond,
+            );
         }
         if let Some(turning) = self.outer {
             // A flared skirt's hem turns by less than a sheet's edge.
@@ -380,6 +385,14 @@ mod tests {
             let kinds: Vec<LoopKind> = loops_of(&soup).iter().map(|l| l.kind).collect();
             prop_assert_eq!(kinds, [LoopKind::Hole, LoopKind::Hole]);
         }
+    }
+
+    #[test]
+    fn a_window_with_straight_sides_is_a_hole() {
+        let window = |u: f64, v: f64| (u - 0.5).abs() > 0.4 || (v - 0.5).abs() > 0.15;
+        let loops = loops_of(&tube(60, window));
+        let rim = loops.iter().find(|l| l.turning < -PI).expect("a hole");
+        assert_eq!(rim.kind, LoopKind::Hole, "{:?}", rim.evidence);
     }
 
     #[test]
