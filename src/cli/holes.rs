@@ -3,7 +3,7 @@
 use super::failure::{Failure, OrFail};
 use super::files;
 use darn_budget::Budget;
-use darn_contract::v1::{HolesReport, Loop, LoopKind};
+use darn_contract::v1::{HolesReport, Loop, LoopKind, SetAside};
 use darn_gltf_scan::{Scan, ScanLimits};
 use std::path::PathBuf;
 
@@ -41,10 +41,21 @@ fn table(report: &HolesReport) -> String {
     for rim in &report.loops {
         text.push_str(&line(rim));
     }
+    text.push_str(&set_aside(&report.set_aside));
     for note in &report.notes {
         text.push_str(&format!("note: {note}\n"));
     }
     text
+}
+
+/// One line that says what was set aside, if anything was.
+pub fn set_aside(kinds: &[SetAside]) -> String {
+    let each = kinds.iter().map(|k| format!("{} {}", k.count, k.kind));
+    let each: Vec<String> = each.collect();
+    match each.as_slice() {
+        [] => String::new(),
+        each => format!("set aside: {}\n", each.join(", ")),
+    }
 }
 
 fn line(rim: &Loop) -> String {

@@ -2,7 +2,7 @@
 
 use super::failure::{Failure, OrFail};
 use super::files;
-use super::holes::kind_name;
+use super::holes::{kind_name, set_aside};
 use super::network::mender;
 use super::progress::WorkProgress;
 use crate::settings::NetworkArgs;
@@ -95,6 +95,7 @@ fn summary(report: &Report) -> String {
             left.reason
         ));
     }
+    text.push_str(&set_aside(&report.set_aside));
     for note in report
         .notes
         .iter()

@@ -6,7 +6,7 @@ use crate::v1;
 
 /// Codes of loops that were left on purpose: by their kind, or because the request did not choose them. Every other code is that of a hole which
 /// should have been filled and could not be.
-const LEFT_ON_PURPOSE: [&str; 8] = [
+const LEFT_ON_PURPOSE: [&str; 9] = [
     "outer_boundary",
     "tube_end",
     "opening",
@@ -15,6 +15,7 @@ const LEFT_ON_PURPOSE: [&str; 8] = [
     "too_large",
     "too_small",
     "same_mesh",
+    "second_skin",
 ];
 
 /// How a mend went: `filled=3 skipped=1 doubtful=0`.

@@ -37,7 +37,7 @@ pub enum ScanError {
         /// How many vertices the primitive has.
         vertices: usize,
     },
-    /// A position is NaN or infinite, as stored or once its node's transform is applied.
+    /// A position that a triangle uses is NaN or infinite, as stored or once its node's transform is applied.
     #[error("{pointer}: position {element} is not finite")]
     NotFinite {
         /// JSON pointer to the POSITION accessor, or to the node whose transform overflows.

@@ -18,6 +18,7 @@ mod error;
 pub mod export;
 mod json;
 mod json_edit;
+mod left_out;
 mod limits;
 mod patch_primitive;
 mod patch_skin;
@@ -36,6 +37,7 @@ mod write_tests;
 
 pub use container::Container;
 pub use error::ScanError;
+pub use left_out::NamedPlace;
 pub use limits::ScanLimits;
 pub use patch_primitive::{PatchPoint, PatchPrimitive};
 pub use scan::{Scan, ScanPart};

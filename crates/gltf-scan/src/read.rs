@@ -93,6 +93,7 @@ fn read(bytes: Bytes, limits: &ScanLimits, budget: &Budget) -> Result<Scan, Scan
         surface,
         parts,
         blocks,
+        not_finite,
         ..
     } = reader;
     if surface.faces.is_empty() {
@@ -102,6 +103,7 @@ fn read(bytes: Bytes, limits: &ScanLimits, budget: &Budget) -> Result<Scan, Scan
     let scan = Scan {
         surface,
         parts,
+        not_finite: not_finite.len(),
         blocks,
         bytes,
         layout,
@@ -144,6 +146,8 @@ struct ScanReader<'d, 'a> {
     surface: TriMesh,
     parts: Vec<ScanPart>,
     blocks: Vec<VertexBlock>,
+    /// Vertices whose position is not finite, ascending; triangles that use one are refused.
+    not_finite: Vec<u32>,
     attributes: AttributeReader<'d, 'a>,
     skinned: BTreeSet<usize>,
     /// Primitives so far, points and lines included.
@@ -160,6 +164,7 @@ impl<'d, 'a> ScanReader<'d, 'a> {
             surface: TriMesh::default(),
             parts: Vec::new(),
             blocks: Vec::new(),
+            not_finite: Vec::new(),
             attributes: AttributeReader::new(document, limits),
             skinned: skinned_meshes(document.root.value),
             primitives: 0,
@@ -227,6 +232,7 @@ impl<'d, 'a> ScanReader<'d, 'a> {
         };
         let (start, count) = (vertices.start, vertices.len());
         let faces = self.read_triangles(place, mode, count)?;
+        self.check_used(&faces, &vertices, &accessor.pointer)?;
         let mirrored = node.transform.mirrors();
         let first = self.surface.faces.len() as u32;
         self.surface.faces.extend(
@@ -313,29 +319,50 @@ impl<'d, 'a> ScanReader<'d, 'a> {
         };
         limit.check(first.saturating_add(accessor.count), &accessor.pointer)?;
         let local = accessor.floats([0.0_f32; 3])?;
-        for (element, point) in local.iter().enumerate() {
-            if !point.iter().all(|x| x.is_finite()) {
-                return Err(ScanError::NotFinite {
-                    pointer: accessor.pointer,
-                    element,
-                });
-            }
+        for (vertex, point) in (first as u32..).zip(&local) {
             let point = node.transform.point(Vec3::from(point.map(f64::from)));
-            if !point.iter().all(|x| x.is_finite()) {
-                return Err(ScanError::NotFinite {
-                    pointer: format!("/nodes/{}", node.index),
-                    element,
-                });
+            if point.iter().all(|x| x.is_finite()) {
+                self.surface.positions.push(point);
+            } else {
+                self.not_finite.push(vertex);
+                self.surface.positions.push(Vec3::zeros());
             }
-            self.surface.positions.push(point);
         }
         let (start, count) = (first as u32, local.len() as u32);
         self.blocks.push(VertexBlock {
             node: node.index,
             start,
+            origin: node.transform.offset.amax(),
             local,
         });
         Ok(start..start + count)
+    }
+
+    /// Refuses triangles (indices into the block `vertices`) that use a position that is not finite.
+    fn check_used(
+        &self,
+        faces: &[[u32; 3]],
+        vertices: &Range<u32>,
+        accessor: &str,
+    ) -> Result<(), ScanError> {
+        let within = |v: &u32| self.not_finite.partition_point(|other| other < v);
+        if within(&vertices.start) == within(&vertices.end) {
+            return Ok(());
+        }
+        let unusable = |v: &u32| self.not_finite.binary_search(&(vertices.start + v)).is_ok();
+        let Some(&element) = faces.iter().flatten().find(|v| unusable(v)) else {
+            return Ok(());
+        };
+        let block = (self.blocks.iter().rev()).find(|block| block.start == vertices.start);
+        let element = element as usize;
+        let pointer = match block {
+            // The stored position is sound: its node's transform overflows.
+            Some(block) if block.local[element].iter().all(|x| x.is_finite()) => {
+                format!("/nodes/{}", block.node)
+            }
+            _ => accessor.into(),
+        };
+        Err(ScanError::NotFinite { pointer, element })
     }
 
     /// The triangles of a primitive, indices below `vertices`; degenerate ones included.

@@ -396,6 +396,44 @@ fn positions_that_are_not_finite_and_indices_out_of_range_are_named() {
 }
 
 #[test]
+fn positions_that_no_triangle_uses_need_not_be_finite() {
+    let mut file = Builder::new();
+    let position = file.floats(&[
+        [f32::NAN, 0.0, 0.0],
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [1.0, 1.0, 0.0],
+        [0.0, f32::INFINITY, 0.0],
+    ]);
+    file.json["accessors"][position]["min"] = json!([0, 0, 0]);
+    file.json["accessors"][position]["max"] = json!([1, 1, 0]);
+    let indices = file.indices_u16(&[1, 2, 3]);
+    file.primitive(json!({"attributes": {"POSITION": position}, "indices": indices}));
+    let scan = read(&file.clone().glb()).unwrap();
+    assert_eq!((scan.not_finite, scan.surface.faces.len()), (2, 1));
+    assert!(
+        scan.surface
+            .positions
+            .iter()
+            .flatten()
+            .all(|x| x.is_finite())
+    );
+    let used = file.indices_u16(&[2, 3, 4]);
+    file.primitive(json!({"attributes": {"POSITION": position}, "indices": used}));
+    let error = read(&file.glb()).unwrap_err();
+    assert_eq!(error.to_string(), "/accessors/0: position 4 is not finite");
+}
+
+#[test]
+fn a_node_that_moves_positions_out_of_range_is_named() {
+    let mut file = Builder::square();
+    file.json["nodes"][0]["scale"] = json!([1e308, 1, 1]);
+    file.json["nodes"][0]["translation"] = json!([1e308, 0, 0]);
+    let error = read(&file.glb()).unwrap_err();
+    assert_eq!(error.to_string(), "/nodes/0: position 1 is not finite");
+}
+
+#[test]
 fn limits_are_named_with_their_value() {
     let glb = Builder::square().glb();
     let tight = |limits: ScanLimits| Scan::read(glb.clone(), &limits).unwrap_err().to_string();

@@ -21,6 +21,9 @@ pub struct Scan {
     pub surface: TriMesh,
     /// The drawn primitives in the order of their faces in `surface`.
     pub parts: Vec<ScanPart>,
+    /// How many vertices of `surface` have a position that is not finite in the file. No triangle uses them; here they
+    /// lie at the origin.
+    pub not_finite: usize,
     /// The vertices of `surface` by the accessor they come from, in order.
     pub(crate) blocks: Vec<VertexBlock>,
     pub(crate) bytes: Bytes,
@@ -73,6 +76,8 @@ pub(crate) struct VertexBlock {
     pub node: usize,
     /// First vertex in `Scan::surface`.
     pub start: u32,
+    /// Largest coordinate of the node's origin in the scene.
+    pub origin: f64,
     /// As stored, in the node's space.
     pub local: Vec<[f32; 3]>,
 }
@@ -138,6 +143,16 @@ impl Scan {
                 .or_else(|| weights("meshes", mesh))
                 .is_some_and(|weights| weights.iter().take(targets).any(on))
         })
+    }
+
+    /// Precision of a vertex's coordinates, scene units: what f32 rounds off where it lies and where its node has its
+    /// origin. 0 for a vertex that does not exist.
+    pub fn precision(&self, vertex: u32) -> f64 {
+        let at = self.surface.positions.get(vertex as usize);
+        let size = at.map_or(0.0, |p| p.amax());
+        let after = self.blocks.partition_point(|block| block.start <= vertex);
+        let block = after.checked_sub(1).and_then(|at| self.blocks.get(at));
+        f64::from(f32::EPSILON) * (size + block.map_or(0.0, |block| block.origin))
     }
 
     /// The node that a vertex of `surface` belongs to, and its position as stored there.

@@ -7,6 +7,7 @@ use serde_json::json;
 
 use crate::VERSION;
 use crate::hole_report::FilledHole;
+use crate::near_seams::{RegionSources, meet_both_sides};
 use crate::welded_scan::{SourceFace, WeldedScan};
 use darn_contract::v1;
 use darn_geometry::mesh::Vec3;
@@ -57,9 +58,14 @@ impl PatchSource<'_> {
                 && other.texcoords.len() == look.texcoords.len()
                 && other.colors.len() == look.colors.len()
         };
+        let looks_alike = |s: &SourceFace| {
+            // A corner of a split face may be a vertex of another part, which has other attributes.
+            let own = &scan.parts[s.part].vertices;
+            alike(s.part) && s.corners.iter().all(|v| own.contains(v))
+        };
         let corners: Vec<Option<[u32; 3]>> = sources
             .iter()
-            .map(|s| s.filter(|s| alike(s.part)).map(|s| s.corners))
+            .map(|s| s.filter(looks_alike).map(|s| s.corners))
             .collect();
         let mut any = vec![u32::MAX; region.mesh.positions.len()];
         let mut owners: Vec<(u32, usize)> = Vec::new();
@@ -67,7 +73,7 @@ impl PatchSource<'_> {
             let Some(source) = source else {
                 continue;
             };
-            if alike(source.part) {
+            if looks_alike(source) {
                 owners.extend(source.corners.map(|s| (s, source.part)));
             }
             for (v, s) in face.iter().zip(&source.corners) {
@@ -97,7 +103,14 @@ impl PatchSource<'_> {
             || extend_attributes(&hole.attribute_map(), patch, region, &columns),
             || normals(patch, region),
         );
-        let dressed = dressed?;
+        let mut dressed = dressed?;
+        if welded.surface.set_aside.near_seam_vertices > 0 {
+            let around = RegionSources {
+                region,
+                sources: &sources,
+            };
+            meet_both_sides(&mut dressed, patch, around, scan);
+        }
         budget.hold(patch_bytes(dressed.corners.len(), width))?;
         let points = dressed.corners.iter().map(|c| match c.scan {
             Some(s) => PatchPoint::Scan(s),
@@ -132,7 +145,7 @@ impl PatchSource<'_> {
             material_of: part,
             points: points.collect(),
             faces: dressed.faces,
-            both_sides: is_backed(region, welded),
+            both_sides: is_backed(region, welded) || welded.has_back(report.id),
             normals: dressed
                 .corners
                 .iter()

@@ -17,6 +17,8 @@ mod anchor_search;
 mod call_pools;
 mod constraints;
 mod context;
+#[cfg(test)]
+mod defect_tests;
 mod doubts;
 mod edit;
 mod error;
@@ -28,6 +30,7 @@ mod inpainter;
 mod limits;
 mod mender;
 mod moved_fill;
+mod near_seams;
 mod nearest_loop;
 mod network_share;
 mod picture;
@@ -35,6 +38,7 @@ mod port;
 mod prepare;
 mod prepared_hole;
 mod scan_holes;
+mod scan_notes;
 mod select;
 mod separate;
 mod session;
@@ -142,7 +146,8 @@ pub fn find_holes(scan: &Scan, budget: &Budget) -> Result<v1::HolesReport, MendE
         components: welded.topology.components as u32,
         vertices: welded.surface.mesh.positions.len() as u32,
         faces: welded.surface.mesh.faces.len() as u32,
-        notes: welded.notes(scan),
+        notes: scan_notes::notes(&welded, scan),
+        set_aside: scan_notes::set_aside(&welded, scan),
         timings: Some(v1::ScanTimings {
             total: milliseconds(started),
             ..welded.timings

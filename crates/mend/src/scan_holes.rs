@@ -14,6 +14,7 @@ use crate::hole_report::FilledHole;
 use crate::inpainter::Inpainter;
 use crate::mender::{Call, NetworkMender};
 use crate::prepared_hole::PreparedHole;
+use crate::scan_notes;
 use crate::select::{HoleRequest, Selection, skipped_for};
 use crate::separate::separate;
 use crate::timings::milliseconds;
@@ -241,7 +242,7 @@ impl ScanHoles {
 
     /// The report of the whole scan.
     pub fn report(&self, scan: &Scan, filled: FilledScan) -> v1::Report {
-        let mut notes = self.welded.notes(scan);
+        let mut notes = scan_notes::notes(&self.welded, scan);
         notes.extend(filled.inpainter.note.clone());
         let holes_ms = self.prepare_ms + filled.fill_ms;
         let timings = self.welded.timings;
@@ -256,6 +257,7 @@ impl ScanHoles {
                 ..timings
             }),
             notes,
+            set_aside: scan_notes::set_aside(&self.welded, scan),
         }
     }
 

@@ -284,6 +284,10 @@ fn reason_to_skip(
     if !welded.on_first_instance(scan, rim) {
         return SkipReason::new("same_mesh", SAME_MESH);
     }
+    if welded.is_second_skin(rim) {
+        let phrase = "a hole of a second skin that lies on the cloth; the patch of the hole beneath shows there as well";
+        return SkipReason::new("second_skin", phrase);
+    }
     if except.contains(&rim.id.0) {
         return SkipReason::new("excepted", "a loop that `except` leaves");
     }

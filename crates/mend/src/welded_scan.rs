@@ -6,12 +6,13 @@ use darn_budget::{Budget, Exhausted};
 
 use crate::timings::milliseconds;
 use darn_contract::{excerpt, v1};
-use darn_geometry::mesh::index::{FaceId, VertexId};
+use darn_geometry::mesh::index::FaceId;
 use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind, boundary_loops};
 use darn_geometry::mesh::openings::Evidence;
 use darn_geometry::mesh::region::BoundedMesh;
+use darn_geometry::mesh::skins::{SecondSkin, second_skins};
 use darn_geometry::mesh::topology::Topology;
-use darn_geometry::mesh::weld::{WeldedMesh, weld};
+use darn_geometry::mesh::weld::{WeldedMesh, weld_within};
 use darn_gltf_scan::Scan;
 
 /// The welded surface of a scan and its loops.
@@ -22,6 +23,8 @@ pub struct WeldedScan {
     pub topology: Topology,
     /// Its boundary loops; a loop's id is its index here.
     pub loops: Vec<BoundaryLoop>,
+    /// Per loop whether it is a hole of a second skin, which is not filled again.
+    pub second_skins: Vec<Option<SecondSkin>>,
     /// Milliseconds of welding and of finding the loops.
     pub timings: v1::ScanTimings,
 }
@@ -38,7 +41,7 @@ const LOOPS_WORK: u64 = 80;
 pub struct SourceFace {
     /// Index of the scan's part that it belongs to.
     pub part: usize,
-    /// Its corners, as vertices of the scan.
+    /// The scan's vertices at the corners of the welded face; one of a split face may belong to another part.
     pub corners: [u32; 3],
 }
 
@@ -52,12 +55,13 @@ impl WeldedScan {
         let faces = scan.surface.faces.len();
         budget.hold(WELDING * faces)?;
         budget.spend_at_once(WELD_WORK * faces as u64)?;
-        let surface = weld(&scan.surface);
+        let surface = weld_within(&scan.surface, &|v| scan.precision(v), budget)?;
         let weld = milliseconds(started);
         let started = Instant::now();
         budget.spend_at_once(LOOPS_WORK * faces as u64)?;
         let topology = surface.topology();
         let loops = boundary_loops(&surface.mesh, &topology);
+        let second_skins = second_skins(&surface.mesh, &loops, budget)?;
         let timings = v1::ScanTimings {
             weld,
             loops: milliseconds(started),
@@ -67,6 +71,7 @@ impl WeldedScan {
             surface,
             topology,
             loops,
+            second_skins,
             timings,
         };
         budget.release(WELDING * faces);
@@ -97,8 +102,21 @@ impl WeldedScan {
         let own = *self.surface.soup_face.get(face.index())?;
         Some(SourceFace {
             part: scan.part_of_face(own)?,
-            corners: *scan.surface.faces.get(own as usize)?,
+            corners: self.surface.soup_corners(&scan.surface, face)?,
         })
+    }
+
+    /// Whether a loop is a hole of a second skin.
+    pub fn is_second_skin(&self, rim: &BoundaryLoop) -> bool {
+        self.second_skins
+            .get(rim.id.index())
+            .is_some_and(Option::is_some)
+    }
+
+    /// Whether a second skin that shows the other side has a copy of this hole.
+    pub fn has_back(&self, hole: u32) -> bool {
+        let mut skins = self.second_skins.iter().flatten();
+        skins.any(|skin| skin.first == hole && skin.is_back)
     }
 
     /// A loop in the contract's words.
@@ -132,57 +150,6 @@ impl WeldedScan {
     pub fn on_first_instance(&self, scan: &Scan, rim: &BoundaryLoop) -> bool {
         let mut sources = rim.half_edges.iter().map(|h| self.source(scan, h.face()));
         sources.all(|s| s.is_none_or(|s| scan.parts[s.part].first_instance))
-    }
-
-    /// What a person should know about the scan as a whole.
-    pub fn notes(&self, scan: &Scan) -> Vec<String> {
-        let mut notes = Vec::new();
-        if self.surface.dropped > 0 {
-            notes.push(format!(
-                "{} degenerate or duplicate triangle(s) were not looked at",
-                self.surface.dropped
-            ));
-        }
-        if !self.topology.non_manifold.is_empty() {
-            notes.push(format!(
-                "{} triangle side(s) lie on edges where more than two triangles meet, or two that face opposite ways; \
-                 the cloth was taken to end there",
-                self.topology.non_manifold.len()
-            ));
-        }
-        let touching = self.touching();
-        if touching > 0 {
-            notes.push(format!(
-                "boundary loops touch themselves or each other at {touching} point(s); where a hole touches the outer boundary \
-                 it is part of it and stays open"
-            ));
-        }
-        if scan.parts.iter().any(|p| p.shared) {
-            notes.push(
-                "a mesh is drawn by several nodes; a patch on it shows at each of them".to_owned(),
-            );
-        }
-        if scan.posed_by_morph_targets() {
-            notes.push(
-                "morph targets move the scan by default; it was mended as it lies without them, and the new cloth does not move with them"
-                    .to_owned(),
-            );
-        }
-        notes
-    }
-
-    /// Number of points in which boundary loops touch (bow-ties).
-    fn touching(&self) -> usize {
-        let place = |v: &VertexId| self.surface.mesh.positions[v.index()];
-        let ends = self.loops.iter().flat_map(|l| &l.vertices).map(place);
-        let mut places: Vec<[u64; 3]> = ends.map(|p| [p.x, p.y, p.z].map(f64::to_bits)).collect();
-        places.sort_unstable();
-        let mut shared: Vec<[u64; 3]> = (places.windows(2))
-            .filter(|w| w[0] == w[1])
-            .map(|w| w[0])
-            .collect();
-        shared.dedup();
-        shared.len()
     }
 }
 

@@ -52,7 +52,7 @@ pub struct BoundaryLoop {
     pub evidence: Vec<Evidence>,
     /// The component of the mesh it bounds; see [`Topology::component`].
     pub component: u32,
-    /// Whether it runs along an edge where other faces could not be joined.
+    /// Whether most of its edges are such where other faces were not joined: then it is no border of cloth.
     pub non_manifold: bool,
 }
 
@@ -170,9 +170,10 @@ fn measured(mesh: &TriMesh, topology: &Topology, half_edges: Vec<HalfEdgeId>) ->
         component: half_edges
             .first()
             .map_or(0, |h| topology.component[h.face().index()]),
-        non_manifold: half_edges
-            .iter()
-            .any(|h| topology.non_manifold.binary_search(h).is_ok()),
+        non_manifold: {
+            let unjoined = |h: &&HalfEdgeId| topology.non_manifold.binary_search(h).is_ok();
+            2 * half_edges.iter().filter(unjoined).count() > half_edges.len()
+        },
         vertices,
         half_edges,
     }

@@ -6,13 +6,16 @@
 //! From a triangle soup to a hole's surroundings: [`weld::weld`] → [`topology::Topology`] → [`loops::boundary_loops`]
 //! → [`region::grow`].
 
+mod border;
 pub(crate) mod bounds;
 pub mod curvature;
+pub mod defects;
 pub mod denoise;
 mod geodesic;
 mod growth;
 pub mod index;
 pub mod intersect;
+mod joints;
 pub mod layers;
 pub mod loops;
 pub mod nearest;
@@ -20,11 +23,15 @@ pub mod openings;
 mod pairing;
 mod piece;
 pub mod region;
+mod repair;
 pub mod shapes;
+pub mod skins;
 pub mod topology;
 mod tube_cut;
 pub mod turning;
 pub mod weld;
+#[cfg(test)]
+mod weld_tests;
 
 use std::collections::HashMap;
 

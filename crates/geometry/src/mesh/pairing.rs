@@ -12,6 +12,17 @@ const NONE: HalfEdgeId = HalfEdgeId(u32::MAX);
 pub(super) struct Twins(Vec<HalfEdgeId>);
 
 impl Twins {
+    /// So many half-edges, none of which has a twin.
+    pub fn unpaired(len: usize) -> Twins {
+        Twins(vec![NONE; len])
+    }
+
+    /// Makes two half-edges twins.
+    pub fn join(&mut self, g: HalfEdgeId, h: HalfEdgeId) {
+        self.0[g.index()] = h;
+        self.0[h.index()] = g;
+    }
+
     /// How many half-edges there are.
     #[inline]
     pub fn len(&self) -> usize {
@@ -155,7 +166,7 @@ pub(super) fn pair_half_edges(faces: &[[u32; 3]], place: &[u32]) -> Pairing {
 
 /// All half-edges in buckets by the lower place of their ends, each bucket sorted by (higher place, half-edge): the
 /// starts of the buckets, and the buckets.
-fn edges_by_place(origins: &[u32], place: &[u32]) -> (Vec<u32>, Vec<(u32, HalfEdgeId)>) {
+pub(super) fn edges_by_place(origins: &[u32], place: &[u32]) -> (Vec<u32>, Vec<(u32, HalfEdgeId)>) {
     let half_edges = || (0..origins.len() as u32).map(HalfEdgeId);
     let ends = |h: HalfEdgeId| {
         let [a, b] = [h, h.next()].map(|h| place[origins[h.index()] as usize]);

@@ -8,8 +8,8 @@ use super::pairing::{Twins, bucket_starts, pair_half_edges, places};
 /// How the faces of a mesh are connected.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Topology {
-    /// Boundary half-edges, ascending, that share both end positions with faces they could not be joined to: three or
-    /// more faces at one edge, or two that run along it in the same direction.
+    /// Boundary half-edges, ascending, that share both ends with faces they were not joined to: three or more faces at
+    /// one edge, or two that cannot face the same way.
     pub non_manifold: Vec<HalfEdgeId>,
     /// Per face the edge-connected component it belongs to, numbered by first face.
     pub component: Vec<u32>,
@@ -26,8 +26,8 @@ impl Topology {
     ///
     /// Two half-edges are twins when they are the only two on their vertex pair and run against each other. Where
     /// more meet (or two run the same way) none of them is joined, and `non_manifold` lists them.
-    /// [`weld`](super::weld::weld) gives sheets that only touch along an edge separate vertices there: each sheet
-    /// stays whole, and only faces that end at the shared edge are listed.
+    /// A welded mesh knows more about such edges: see
+    /// [`WeldedMesh::topology`](super::weld::WeldedMesh::topology).
     ///
     /// # Panics
     /// When a face names a vertex that does not exist.
@@ -120,7 +120,7 @@ impl Topology {
 }
 
 /// Per face its edge-connected component, numbered by first face, and how many there are.
-fn face_components(twins: &Twins) -> (Vec<u32>, usize) {
+pub(super) fn face_components(twins: &Twins) -> (Vec<u32>, usize) {
     const OPEN: u32 = u32::MAX;
     let mut component = vec![OPEN; twins.len() / 3];
     let (mut count, mut stack) = (0, Vec::new());

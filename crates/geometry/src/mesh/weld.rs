@@ -1,7 +1,11 @@
-//! Welding: one vertex per exact position, then one vertex per sheet where sheets touch only in a point or an edge.
+//! Welding: a triangle soup made into surfaces, forgiving what files have that cloth has not.
+
+use darn_budget::{Budget, Exhausted};
 
 use super::TriMesh;
-use super::pairing::{Twins, bucket_starts, pair_half_edges, places};
+use super::index::{FaceId, HalfEdgeId};
+use super::pairing::{Twins, bucket_starts, places};
+use super::repair::{Repair, Repaired, Working};
 use super::topology::Topology;
 
 /// A triangle soup made into surfaces, and how its faces lead back to the soup's.
@@ -9,62 +13,136 @@ use super::topology::Topology;
 pub struct WeldedMesh {
     /// The welded mesh; vertices are numbered by first use in face order, none is unused.
     pub mesh: TriMesh,
-    /// Per welded face the soup's face, ascending; corner k of one is corner k of the other.
+    /// Per welded face the soup's face, ascending; the parts of a split face have the same. For their corners see
+    /// [`WeldedMesh::soup_corners`].
     pub soup_face: Vec<u32>,
-    /// How many faces of the soup were left out: two corners in one place, the same three places as an earlier face
-    /// (whichever side it shows), or an index out of range.
-    pub dropped: usize,
+    /// What the mesh does not have as the soup has it.
+    pub set_aside: SetAside,
     /// Per welded face whether one of the faces left out shows its other side.
     pub two_sided: Vec<bool>,
-    /// The twins of the welded mesh's half-edges. `None` when sheets of the soup share an edge: splitting them makes
-    /// more pairs.
-    twins: Option<Twins>,
+    /// The twins of the welded mesh's half-edges.
+    twins: Twins,
+    /// What [`Topology::non_manifold`] lists.
+    non_manifold: Vec<HalfEdgeId>,
+    /// The faces that were turned or split, ascending, with the soup's vertices at their corners.
+    changed: Vec<(FaceId, [u32; 3])>,
+}
+
+/// How many things a welded mesh does not have as its soup has them, by kind.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct SetAside {
+    /// Faces left out because they name a vertex that does not exist or have no area; at the border also those that are
+    /// no higher than the tolerance.
+    pub degenerate_faces: usize,
+    /// Faces left out because an earlier face has the same three places (whichever side it shows).
+    pub duplicate_faces: usize,
+    /// Faces left out because they hang, in pieces of few, on an edge that others share more smoothly.
+    pub fins: usize,
+    /// Faces turned to face the same way as those around them.
+    pub flipped_faces: usize,
+    /// Border vertices on the border edge of another face, which was split there.
+    pub t_junctions: usize,
+    /// Places joined to another that lies within the tolerance.
+    pub near_seam_vertices: usize,
 }
 
 impl WeldedMesh {
-    /// [`Topology::new`] of the welded mesh, without pairing its half-edges again.
+    /// How the welded faces are connected. Two that share both ends of an edge may still be apart there: see [`weld`].
     pub fn topology(&self) -> Topology {
-        match &self.twins {
-            Some(twins) => Topology::with_twins(&self.mesh, twins.clone(), Vec::new()),
-            None => Topology::new(&self.mesh),
+        Topology::with_twins(&self.mesh, self.twins.clone(), self.non_manifold.clone())
+    }
+
+    /// The vertices of `soup` at a welded face's corners, in the order of the welded face: those of its face in the
+    /// soup, reversed where the face was turned. A part of a split face has vertices of other faces, too.
+    pub fn soup_corners(&self, soup: &TriMesh, face: FaceId) -> Option<[u32; 3]> {
+        let own = *self.soup_face.get(face.index())?;
+        match self
+            .changed
+            .binary_search_by_key(&face, |changed| changed.0)
+        {
+            Ok(at) => Some(self.changed[at].1),
+            Err(_) => soup.faces.get(own as usize).copied(),
         }
     }
 }
 
-/// Welds `soup` by exact position (−0 equals 0) and splits bow-ties. Near linear.
-///
-/// A vertex whose faces form several edge-connected fans becomes one vertex per fan, all in the same place, so every
-/// boundary vertex of the result lies on exactly one boundary loop. Faces are not joined across an edge where more
-/// than two meet or two run the same way (a sheet crossed by such an edge up to its border is slit there). The result
-/// depends on the order of faces, not on how the soup numbered its vertices.
+/// [`weld_within`] for coordinates that are exact, without a budget.
 pub fn weld(soup: &TriMesh) -> WeldedMesh {
-    let place = places(soup);
-    let distinct = distinct_faces(&soup.faces, &place);
-    let faces: Vec<[u32; 3]> = distinct
-        .faces
-        .iter()
-        .map(|&f| soup.faces[f as usize].map(|v| place[v as usize]))
-        .collect();
-    let pairing = pair_half_edges(&faces, &place);
-    let (fan, fans) = pairing.twins.corner_fans();
+    // Without a budget nothing is exhausted.
+    weld_within(soup, &|_| 0.0, Budget::unlimited()).unwrap_or_default()
+}
+
+/// Welds `soup`: one vertex per place, then one per sheet where sheets touch only in a point or an edge. Near linear.
+///
+/// A place is an exact position (−0 equals 0). Border vertices are one place, too, when they are closer than four times
+/// the precision of their coordinates (`precision` of a vertex of the soup, scene units) or a thousandth of the shortest
+/// border edge there, and than a tenth of that edge. Inner vertices never move. A border edge that passes a border
+/// vertex as closely is split there, if that lets faces meet.
+///
+/// Every edge joins at most two faces. Where more meet, the pairs that continue each other most smoothly are joined and
+/// small pieces that hang on the edge are left out; where two only nearly meet and lie on each other, they are two
+/// skins and stay apart. Faces that face the other way than most of their sheet are turned, as long as the sheet has
+/// two sides.
+///
+/// A vertex whose faces form several edge-connected fans becomes one vertex per fan, so every boundary vertex of the
+/// result lies on exactly one boundary loop. The result depends on the order of faces, not on how the soup numbered
+/// its vertices.
+///
+/// # Errors
+/// `Exhausted`.
+pub fn weld_within(
+    soup: &TriMesh,
+    precision: &dyn Fn(u32) -> f64,
+    budget: &Budget,
+) -> Result<WeldedMesh, Exhausted> {
+    let exact = places(soup);
+    let distinct = distinct_faces(&soup.faces, &exact);
+    let repair = Repair {
+        soup,
+        exact: &exact,
+        precision,
+        budget,
+    };
+    let corners = distinct.faces.iter();
+    let repaired = repair.joined(Working {
+        corners: corners.map(|&f| soup.faces[f as usize]).collect(),
+        soup_face: distinct.faces,
+        two_sided: distinct.two_sided,
+    })?;
+    let Repaired {
+        faces,
+        twins,
+        non_manifold,
+        set_aside,
+    } = repaired;
+    let (fan, fans) = twins.corner_fans();
     let mut positions = Vec::with_capacity(fans);
-    for (corner, &old) in faces.as_flattened().iter().enumerate() {
+    for (corner, &vertex) in faces.corners.as_flattened().iter().enumerate() {
         if fan[corner] as usize == positions.len() {
-            positions.push(soup.positions[old as usize]);
+            positions.push(soup.positions[exact[vertex as usize] as usize]);
         }
     }
-    let dropped = soup.faces.len() - faces.len();
-    let (faces, _) = fan.as_chunks::<3>();
-    WeldedMesh {
+    let unlike = |(f, corners): (u32, &[u32; 3])| {
+        let own = soup.faces[faces.soup_face[f as usize] as usize];
+        (own != *corners).then_some((FaceId(f), *corners))
+    };
+    let (numbered, _) = fan.as_chunks::<3>();
+    Ok(WeldedMesh {
         mesh: TriMesh {
             positions,
-            faces: faces.to_vec(),
+            faces: numbered.to_vec(),
         },
-        soup_face: distinct.faces,
-        dropped,
-        two_sided: distinct.two_sided,
-        twins: pairing.non_manifold.is_empty().then_some(pairing.twins),
-    }
+        changed: (0u32..).zip(&faces.corners).filter_map(unlike).collect(),
+        soup_face: faces.soup_face,
+        set_aside: SetAside {
+            degenerate_faces: distinct.set_aside.degenerate_faces + set_aside.degenerate_faces,
+            duplicate_faces: distinct.set_aside.duplicate_faces,
+            ..set_aside
+        },
+        two_sided: faces.two_sided,
+        twins,
+        non_manifold,
+    })
 }
 
 /// The faces that [`distinct_faces`] keeps.
@@ -73,6 +151,8 @@ struct DistinctFaces {
     faces: Vec<u32>,
     /// Per kept face whether a later face has the same places in the opposite order.
     two_sided: Vec<bool>,
+    /// The others.
+    set_aside: SetAside,
 }
 
 /// The faces with three different places that no earlier face has.
@@ -119,11 +199,19 @@ fn distinct_faces(faces: &[[u32; 3]], place: &[u32]) -> DistinctFaces {
                 (rest.iter()).any(|other| ascends_twice(other.2) != ascends_twice(kept));
         }
     }
-    let (faces, two_sided) = (0..faces.len() as u32)
+    let (kept, two_sided): (Vec<u32>, Vec<bool>) = (0..faces.len() as u32)
         .filter(|&f| first[f as usize])
         .map(|f| (f, two_sided[f as usize]))
         .unzip();
-    DistinctFaces { faces, two_sided }
+    DistinctFaces {
+        set_aside: SetAside {
+            degenerate_faces: faces.len() - sorted.len(),
+            duplicate_faces: sorted.len() - kept.len(),
+            ..SetAside::default()
+        },
+        faces: kept,
+        two_sided,
+    }
 }
 
 #[cfg(test)]
@@ -131,7 +219,6 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::mesh::index::HalfEdgeId;
     use crate::mesh::shapes::{concat, explode, jitter, sheet, shuffle};
     use crate::mesh::{Vec3, loops};
 
@@ -159,7 +246,7 @@ mod tests {
             let once = weld(&explode(&soup)).mesh;
             let twice = weld(&once);
             prop_assert_eq!(twice.mesh, once);
-            prop_assert_eq!(twice.dropped, 0);
+            prop_assert_eq!(twice.set_aside, SetAside::default());
         }
 
         #[test]
@@ -238,7 +325,13 @@ mod tests {
             ],
         };
         let welded = weld(&soup);
-        assert_eq!((welded.soup_face, welded.dropped), (vec![0, 5], 4));
+        assert_eq!(welded.soup_face, [0, 5]);
+        let left_out = SetAside {
+            degenerate_faces: 2,
+            duplicate_faces: 2,
+            ..SetAside::default()
+        };
+        assert_eq!(welded.set_aside, left_out);
         assert_eq!(welded.mesh.positions, [a, b, c, d]);
     }
 
@@ -253,26 +346,42 @@ mod tests {
             ],
             faces: vec![[0, 1, 2]],
         };
-        let mesh = weld(&concat(&sheet, &fin)).mesh;
-        let topology = Topology::new(&mesh);
-        assert_eq!(topology.components, 2);
-        assert_eq!(topology.non_manifold.len(), 1);
-        let loops = loops::boundary_loops(&mesh, &topology);
-        let named: Vec<_> = loops
-            .iter()
-            .map(|l| (l.vertices.len(), l.non_manifold))
-            .collect();
-        assert_eq!(named, [(16, false), (3, true)]);
+        let welded = weld(&concat(&sheet, &fin));
+        assert_eq!(welded.set_aside.fins, 1);
+        let topology = welded.topology();
+        assert_eq!(topology.components, 1);
+        assert_eq!(topology.non_manifold, []);
+        let loops = loops::boundary_loops(&welded.mesh, &topology);
+        let lengths: Vec<usize> = loops.iter().map(|l| l.vertices.len()).collect();
+        assert_eq!(lengths, [16]);
     }
 
     #[test]
-    fn faces_that_run_the_same_way_are_not_joined() {
-        let soup = TriMesh {
-            positions: vec![Vec3::zeros(), Vec3::x(), Vec3::y(), -Vec3::y()],
+    fn faces_that_face_opposite_ways_are_joined_where_they_continue_each_other() {
+        let fold = |z: f64| TriMesh {
+            positions: vec![
+                Vec3::zeros(),
+                Vec3::x(),
+                Vec3::y(),
+                Vec3::new(0.0, -1.0, z),
+                Vec3::new(0.0, 1.0, z),
+            ],
             faces: vec![[0, 1, 2], [0, 1, 3]],
         };
-        let topology = Topology::new(&weld(&soup).mesh);
-        assert_eq!(topology.components, 2);
-        assert_eq!(topology.non_manifold, [HalfEdgeId(0), HalfEdgeId(3)]);
+        let flat = weld(&fold(0.3));
+        assert_eq!(
+            (flat.set_aside.flipped_faces, flat.topology().components),
+            (1, 1)
+        );
+        assert_eq!(flat.soup_corners(&fold(0.3), FaceId(1)), Some([0, 3, 1]));
+        let mut folded_back = fold(0.3);
+        folded_back.faces[1] = [0, 1, 4];
+        let sharp = weld(&folded_back);
+        assert_eq!(sharp.set_aside, SetAside::default());
+        assert_eq!(sharp.topology().components, 2);
+        assert_eq!(
+            sharp.topology().non_manifold,
+            [HalfEdgeId(0), HalfEdgeId(3)]
+        );
     }
 }

@@ -7,7 +7,7 @@ use crate::mesh::loops::boundary_loops;
 use crate::mesh::region::region_around_hole;
 use crate::mesh::shapes::{jitter, sheet};
 use crate::mesh::topology::Topology;
-use crate::mesh::weld::weld;
+use crate::mesh::weld::{SetAside, weld};
 
 /// A wavy sheet with a round hole, its chart scaled by `slack` (1 for none), and a grid of zeros.
 ///
@@ -229,7 +229,11 @@ fn a_rim_that_touches_itself_is_closed_on_the_scan() {
     let patch = plan.patch(&chart, &filled, &[], &options).unwrap();
 
     let whole = weld(&quality::joined(&patch, &region));
-    assert_eq!(whole.dropped, 0, "a triangle has no area");
+    assert_eq!(
+        whole.set_aside,
+        SetAside::default(),
+        "a triangle has no area"
+    );
     let topology = Topology::new(&whole.mesh);
     assert!(topology.non_manifold.is_empty());
     assert_eq!(boundary_loops(&whole.mesh, &topology).len(), 1);

@@ -1,0 +1,316 @@
+//! The faces of a soup on their way to a welded mesh, and what is done to those that do not fit together as they are.
+//!
+//! In order: slivers at the border are left out, border vertices that nearly meet become one place, border edges are split where vertices of others lie on
+//! them, the half-edges are paired ([`joints`](super::joints)), faces are turned so that neighbours face one way, and
+//! fins are left out.
+
+use std::cmp::Reverse;
+
+use darn_budget::{Budget, Exhausted, Steps};
+
+use super::TriMesh;
+use super::border::{Border, Junction, PlacedFaces, bounded};
+use super::index::{FaceId, HalfEdgeId};
+use super::joints::{Joints, joints, turned_half_edge, turning};
+use super::pairing::{Twins, pair_half_edges};
+use super::topology::face_components;
+use super::weld::SetAside;
+
+/// Faces that a fin may have.
+const MAX_FIN: usize = 8;
+/// Nanoseconds of work a face in one pass over the mesh.
+const FACE_WORK: u64 = 150;
+
+/// Faces that lead back to those of a soup.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Working {
+    /// Per face its corners, vertices of the soup.
+    pub corners: Vec<[u32; 3]>,
+    /// Per face the soup's face, ascending; the parts of a split face have the same.
+    pub soup_face: Vec<u32>,
+    /// Per face whether a face left out shows its other side.
+    pub two_sided: Vec<bool>,
+}
+
+/// The mesh of a soup before its vertices are numbered.
+pub(super) struct Repaired {
+    /// The faces.
+    pub faces: Working,
+    /// Their twins.
+    pub twins: Twins,
+    /// What [`Topology::non_manifold`](super::topology::Topology::non_manifold) lists.
+    pub non_manifold: Vec<HalfEdgeId>,
+    /// What was changed.
+    pub set_aside: SetAside,
+}
+
+/// A soup, the faces of it that are looked at, and what decides whether they meet.
+pub(super) struct Repair<'a> {
+    /// The soup.
+    pub soup: &'a TriMesh,
+    /// Per vertex of the soup its exact place.
+    pub exact: &'a [u32],
+    /// Precision of the coordinates of a vertex of the soup, scene units.
+    pub precision: &'a dyn Fn(u32) -> f64,
+    /// What it may cost.
+    pub budget: &'a Budget<'a>,
+}
+
+impl Repair<'_> {
+    /// Joins the faces; those of a clean soup as they are.
+    ///
+    /// # Errors
+    /// `Exhausted`.
+    pub fn joined(&self, mut faces: Working) -> Result<Repaired, Exhausted> {
+        let mut set_aside = SetAside::default();
+        let mut places = placed(&faces.corners, self.exact);
+        let mut pairing = pair_half_edges(&places, self.exact);
+        let slivers = self.border_slivers(&places, &pairing.twins);
+        if !slivers.is_empty() {
+            self.budget.spend_at_once(FACE_WORK * places.len() as u64)?;
+            let mut kept = vec![true; places.len()];
+            slivers.iter().for_each(|f| kept[f.index()] = false);
+            set_aside.degenerate_faces = slivers.len();
+            faces = faces.only(&kept);
+            places = placed(&faces.corners, self.exact);
+            pairing = pair_half_edges(&places, self.exact);
+        }
+        let border = self.border(&places, &pairing.twins)?;
+        let near = border.near_places()?;
+        let mut junctions = match near.as_slice() {
+            [] => border.junctions()?,
+            _ => Vec::new(),
+        };
+        drop(border);
+        if near.is_empty() && junctions.is_empty() && pairing.non_manifold.is_empty() {
+            return Ok(Repaired {
+                faces,
+                twins: pairing.twins,
+                non_manifold: Vec::new(),
+                set_aside,
+            });
+        }
+        drop(pairing);
+        self.budget.spend_at_once(FACE_WORK * places.len() as u64)?;
+        let mut place = self.exact.to_vec();
+        if !near.is_empty() {
+            set_aside.near_seam_vertices = near.len();
+            let mut lowest: Vec<u32> = (0..place.len() as u32).collect();
+            near.iter()
+                .for_each(|(from, to)| lowest[*from as usize] = *to);
+            place.iter_mut().for_each(|p| *p = lowest[*p as usize]);
+            places = placed(&faces.corners, &place);
+            let twins = pair_half_edges(&places, &place).twins;
+            junctions = self.border(&places, &twins)?.junctions()?;
+        }
+        if !junctions.is_empty() {
+            set_aside.t_junctions = junctions.len();
+            faces = faces.split(&junctions);
+            places = placed(&faces.corners, &place);
+        }
+        self.chosen(faces, &places, set_aside)
+    }
+
+    /// The faces at the border that are no higher than the tolerance, ascending: they keep borders apart that meet.
+    fn border_slivers(&self, places: &[[u32; 3]], twins: &Twins) -> Vec<FaceId> {
+        let is_sliver = |f: &FaceId| {
+            let corners = places[f.index()];
+            let [a, b, c] = corners.map(|v| self.soup.positions[v as usize]);
+            let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
+            let precision = corners.map(self.precision).into_iter().fold(0.0, f64::max);
+            let doubled = (b - a).cross(&(c - a)).norm();
+            let squared = longest * longest;
+            squared.is_normal() && doubled <= longest * bounded(precision, longest)
+        };
+        let mut slivers: Vec<FaceId> = (twins.boundary().map(HalfEdgeId::face))
+            .filter(is_sliver)
+            .collect();
+        slivers.dedup();
+        slivers
+    }
+
+    fn border<'b>(
+        &'b self,
+        places: &'b [[u32; 3]],
+        twins: &Twins,
+    ) -> Result<Border<'b>, Exhausted> {
+        let placed = self.placed_faces(places);
+        Border::of(placed, twins, self.precision, self.budget)
+    }
+
+    fn placed_faces<'b>(&'b self, places: &'b [[u32; 3]]) -> PlacedFaces<'b> {
+        PlacedFaces {
+            positions: &self.soup.positions,
+            faces: places,
+        }
+    }
+
+    /// Pairs the half-edges of faces that do not all fit together.
+    fn chosen(
+        &self,
+        mut faces: Working,
+        places: &[[u32; 3]],
+        mut set_aside: SetAside,
+    ) -> Result<Repaired, Exhausted> {
+        self.budget.spend_at_once(FACE_WORK * places.len() as u64)?;
+        let mut steps = Steps::of(self.budget);
+        let exact = placed(&faces.corners, self.exact);
+        let from = |h: HalfEdgeId| exact[h.face().index()][h.corner()];
+        let is_exact = |g: HalfEdgeId, h: HalfEdgeId| {
+            let (a, b) = (from(g), from(g.next()));
+            let (c, d) = (from(h), from(h.next()));
+            (a.min(b), a.max(b)) == (c.min(d), c.max(d))
+        };
+        let joints = joints(self.placed_faces(places), is_exact, &mut steps)?;
+        let turning = turning(&joints);
+        let turned = |h: HalfEdgeId| turned_half_edge(h, &turning.turned);
+        let Joints {
+            twins: before,
+            mut crowded,
+            ..
+        } = joints;
+        crowded.extend(turning.apart.iter().map(|pair| pair.to_vec()));
+        let mut twins = Twins::unpaired(before.len());
+        for h in (0..before.len() as u32).map(HalfEdgeId) {
+            if let Some(g) = before.of(h).filter(|g| *g > h) {
+                twins.join(turned(g), turned(h));
+            }
+        }
+        for [g, h] in &turning.joined {
+            twins.join(turned(*g), turned(*h));
+        }
+        for (corners, turned) in faces.corners.iter_mut().zip(&turning.turned) {
+            if *turned {
+                corners.swap(1, 2);
+                set_aside.flipped_faces += 1;
+            }
+        }
+        crowded.iter_mut().flatten().for_each(|h| *h = turned(*h));
+        Ok(without_fins(faces, twins, &crowded, set_aside))
+    }
+}
+
+/// The faces by places.
+fn placed(corners: &[[u32; 3]], place: &[u32]) -> Vec<[u32; 3]> {
+    let face = |corners: &[u32; 3]| corners.map(|v| place[v as usize]);
+    corners.iter().map(face).collect()
+}
+
+/// Leaves out the fins: connected pieces of few faces that hang on an edge which others share.
+fn without_fins(
+    faces: Working,
+    twins: Twins,
+    crowded: &[Vec<HalfEdgeId>],
+    mut set_aside: SetAside,
+) -> Repaired {
+    let (component, count) = face_components(&twins);
+    let mut size = vec![0usize; count];
+    component.iter().for_each(|&c| size[c as usize] += 1);
+    let most = MAX_FIN.min(component.len() / 4);
+    let mut fin = vec![false; count];
+    for group in crowded.iter().filter(|group| group.len() > 2) {
+        let hanging = group.iter().filter(|h| twins.of(**h).is_none());
+        // Where everything at an edge is small, its largest piece is the cloth.
+        let of = |h: &HalfEdgeId| component[h.face().index()];
+        let largest = group
+            .iter()
+            .map(of)
+            .max_by_key(|&c| (size[c as usize], Reverse(c)));
+        for c in hanging.map(of).filter(|&c| Some(c) != largest) {
+            fin[c as usize] |= size[c as usize] <= most;
+        }
+    }
+    let kept: Vec<bool> = component.iter().map(|&c| !fin[c as usize]).collect();
+    set_aside.fins = kept.iter().filter(|kept| !**kept).count();
+    let mut number = vec![0; kept.len()];
+    let mut next = 0;
+    for (number, _) in number.iter_mut().zip(&kept).filter(|(_, kept)| **kept) {
+        *number = next;
+        next += 1;
+    }
+    let renumbered = |h: HalfEdgeId| FaceId(number[h.face().index()]).half_edges()[h.corner()];
+    let is_kept = |h: &HalfEdgeId| kept[h.face().index()];
+    let half_edges = (0..twins.len() as u32).map(HalfEdgeId);
+    let mut non_manifold: Vec<HalfEdgeId> = crowded
+        .iter()
+        .filter(|group| group.iter().filter(|h| is_kept(h)).count() > 1)
+        .flatten()
+        .filter(|h| is_kept(h) && twins.of(**h).is_none())
+        .map(|&h| renumbered(h))
+        .collect();
+    non_manifold.sort_unstable();
+    non_manifold.dedup();
+    let of_kept = half_edges.filter(is_kept);
+    Repaired {
+        twins: of_kept.map(|h| twins.of(h).map(renumbered)).collect(),
+        faces: faces.only(&kept),
+        non_manifold,
+        set_aside,
+    }
+}
+
+impl Working {
+    /// The faces that are kept.
+    fn only(self, kept: &[bool]) -> Working {
+        fn filtered<T>(values: Vec<T>, kept: &[bool]) -> Vec<T> {
+            let each = values.into_iter().zip(kept);
+            each.filter(|(_, kept)| **kept)
+                .map(|(value, _)| value)
+                .collect()
+        }
+        Working {
+            corners: filtered(self.corners, kept),
+            soup_face: filtered(self.soup_face, kept),
+            two_sided: filtered(self.two_sided, kept),
+        }
+    }
+
+    /// Splits faces at the vertices on their edges; `junctions` are in the order of edges, and along each.
+    fn split(self, junctions: &[Junction]) -> Working {
+        let mut out = Working::default();
+        let mut by_face = junctions.chunk_by(|x, y| x.half_edge.face() == y.half_edge.face());
+        let mut next = by_face.next();
+        for (f, corners) in (0u32..).zip(self.corners) {
+            let own = next.filter(|on| on[0].half_edge.face() == FaceId(f));
+            let parts = match own {
+                Some(on) => {
+                    next = by_face.next();
+                    parts(FaceId(f), corners, on)
+                }
+                None => vec![corners],
+            };
+            out.soup_face
+                .extend(parts.iter().map(|_| self.soup_face[f as usize]));
+            out.two_sided
+                .extend(parts.iter().map(|_| self.two_sided[f as usize]));
+            out.corners.extend(parts);
+        }
+        out
+    }
+}
+
+/// The parts of a face whose edges have further vertices: fans from the opposite corners, one edge after another.
+fn parts(face: FaceId, corners: [u32; 3], junctions: &[Junction]) -> Vec<[u32; 3]> {
+    let on = |side: usize| {
+        let on_side = junctions
+            .iter()
+            .filter(move |j| j.half_edge == face.half_edges()[side]);
+        on_side.map(|j| j.place)
+    };
+    let mut parts = vec![corners];
+    for side in 0..3 {
+        let (from, to) = (corners[side], corners[(side + 1) % 3]);
+        // The one part that has the whole edge, and its corner across.
+        let Some((at, across)) = parts.iter().enumerate().find_map(|(at, part)| {
+            let k = (0..3).find(|&k| part[k] == from && part[(k + 1) % 3] == to)?;
+            Some((at, part[(k + 2) % 3]))
+        }) else {
+            continue;
+        };
+        let stops: Vec<u32> = [from].into_iter().chain(on(side)).chain([to]).collect();
+        let fan = stops.windows(2).map(|ends| [ends[0], ends[1], across]);
+        let fan: Vec<[u32; 3]> = fan.collect();
+        parts.splice(at..=at, fan);
+    }
+    parts
+}

@@ -1,0 +1,113 @@
+//! What a report says about a scan as a whole: notes for a person, and what was set aside, by kind.
+
+use darn_contract::{excerpt, v1};
+use darn_geometry::mesh::index::VertexId;
+use darn_gltf_scan::{NamedPlace, Scan};
+
+use crate::welded_scan::WeldedScan;
+
+/// Names that a note gives before it says how many more there are.
+const MAX_NAMED: usize = 5;
+
+/// What a person should know about a scan as a whole.
+pub fn notes(welded: &WeldedScan, scan: &Scan) -> Vec<String> {
+    let mut notes = Vec::new();
+    let unjoined = welded.topology.non_manifold.len();
+    if unjoined > 0 {
+        notes.push(format!(
+            "{unjoined} triangle side(s) lie on edges where they continue no other triangle: more than two meet there, or two that \
+             cannot face the same way; the cloth was taken to end there"
+        ));
+    }
+    let touching = touching(welded);
+    if touching > 0 {
+        notes.push(format!(
+            "boundary loops touch themselves or each other at {touching} point(s); where a hole touches the outer boundary \
+             it is part of it and stays open"
+        ));
+    }
+    let skins = welded.second_skins.iter().flatten().count();
+    if skins > 0 {
+        notes.push(format!(
+            "{skins} hole(s) belong to a second skin that lies on the cloth; they are closed by the patches of the first skin"
+        ));
+    }
+    if scan.parts.iter().any(|p| p.shared) {
+        notes.push(
+            "a mesh is drawn by several nodes; a patch on it shows at each of them".to_owned(),
+        );
+    }
+    if scan.posed_by_morph_targets() {
+        notes.push(
+            "morph targets move the scan by default; it was mended as it lies without them, and the new cloth does not move with them"
+                .to_owned(),
+        );
+    }
+    let scenes = scan.other_scenes();
+    if !scenes.is_empty() {
+        notes.push(format!(
+            "the file has other scenes with meshes of their own ({}); only the default scene was looked at",
+            listed("scene", &scenes)
+        ));
+    }
+    let levels = scan.other_levels();
+    if !levels.is_empty() {
+        notes.push(format!(
+            "the file has other levels of detail (MSFT_lod of {}); only the first level was looked at",
+            listed("node", &levels)
+        ));
+    }
+    notes
+}
+
+/// What was not taken as the file has it, by kind.
+pub fn set_aside(welded: &WeldedScan, scan: &Scan) -> Vec<v1::SetAside> {
+    let own = welded.surface.set_aside;
+    let counts = [
+        ("degenerate_face", own.degenerate_faces),
+        ("duplicate_face", own.duplicate_faces),
+        ("fin", own.fins),
+        ("flipped_face", own.flipped_faces),
+        ("t_junction", own.t_junctions),
+        ("near_seam_vertex", own.near_seam_vertices),
+        ("vertex_not_finite", scan.not_finite),
+    ];
+    counts
+        .into_iter()
+        .filter(|(_, count)| *count > 0)
+        .map(|(kind, count)| v1::SetAside {
+            kind: kind.to_owned(),
+            count: count as u32,
+        })
+        .collect()
+}
+
+/// The first places of a list by index and name, and how many more there are.
+fn listed(what: &str, places: &[NamedPlace]) -> String {
+    let named = places.iter().take(MAX_NAMED).map(|place| match place.name {
+        Some(name) => format!("{what} {} {:?}", place.index, excerpt(name)),
+        None => format!("{what} {}", place.index),
+    });
+    let named: Vec<String> = named.collect();
+    let more = places.len().saturating_sub(MAX_NAMED);
+    let rest = if more > 0 {
+        format!(" and {more} more")
+    } else {
+        String::new()
+    };
+    named.join(", ") + &rest
+}
+
+/// Number of points in which boundary loops touch (bow-ties).
+fn touching(welded: &WeldedScan) -> usize {
+    let place = |v: &VertexId| welded.surface.mesh.positions[v.index()];
+    let ends = welded.loops.iter().flat_map(|l| &l.vertices).map(place);
+    let mut places: Vec<[u64; 3]> = ends.map(|p| [p.x, p.y, p.z].map(f64::to_bits)).collect();
+    places.sort_unstable();
+    let mut shared: Vec<[u64; 3]> = (places.windows(2))
+        .filter(|w| w[0] == w[1])
+        .map(|w| w[0])
+        .collect();
+    shared.dedup();
+    shared.len()
+}
