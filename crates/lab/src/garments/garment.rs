@@ -87,8 +87,6 @@ pub struct Garment {
     pub mesh: TriMesh,
     /// Its openings.
     pub openings: Vec<Opening>,
-    /// Per opening its vertices, ascending.
-    pub(super) opening_vertices: Vec<Vec<u32>>,
     /// The flat pieces.
     pub(super) sewn: Sewn,
     /// Root mean square of (length ÷ rest length − 1) over the edges.
@@ -130,7 +128,6 @@ pub fn make(kind: GarmentKind, seed: u64) -> Result<Garment, GarmentError> {
             kind,
             seed,
             openings: names.map(|(name, own)| opening(&mesh, name, own)).collect(),
-            opening_vertices: sewn.openings.clone(),
             mesh,
             sewn,
             strain: draped.strain,

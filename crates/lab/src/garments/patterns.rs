@@ -32,7 +32,9 @@ pub(super) fn draw(kind: GarmentKind, rng: &mut impl Rng) -> Pattern {
     };
     let fabric = match kind {
         GarmentKind::Glove => GarmentFabric {
-            bend: woven.bend * 0.05,
+            // An edge is a third as long as in other garments.
+            bend: woven.bend * 0.015,
+            compress: 10.0 * woven.compress,
             ..woven
         },
         GarmentKind::Vest => GarmentFabric {
@@ -361,7 +363,7 @@ fn trousers(rng: &mut impl Rng) -> Cut {
         .line([-hip, crotch], Seam(4))
         .line([-cuff, 0.0], Seam(5));
     let (crotch, high) = (crotch as f32, top as f32);
-    let lift: f32 = rng.random_range(0.2..1.1);
+    let lift: f32 = rng.random_range(0.2..0.7);
     let shin = 0.5 * (crotch + 0.1);
     let leg = |side: f32, lift: f32| Limb {
         root: [side * 0.115, 0.0, crotch + 0.08],
@@ -395,7 +397,7 @@ fn trousers(rng: &mut impl Rng) -> Cut {
 /// A glove with bent fingers; closed, or without the fingers' ends.
 fn glove(rng: &mut impl Rng) -> Cut {
     let open = rng.random_bool(0.5);
-    let (finger, gap, palm) = (0.0225, 0.003, 0.1);
+    let (finger, gap, palm) = (0.0235, 0.005, 0.1);
     let wide = 2.0 * finger + 1.5 * gap;
     let length = |k: usize, scale: f64| scale * [0.068, 0.076, 0.072, 0.058][k];
     let scale = if open { 0.6 } else { 1.0 };
@@ -443,8 +445,8 @@ fn glove(rng: &mut impl Rng) -> Cut {
         };
         body.extend(phalanges.capsules());
         body.push(Capsule::still(
-            [[0.75 * x, 0.0, -0.02], [x, 0.0, palm as f32]],
-            [0.009, 0.006],
+            [[0.6 * x, 0.0, -0.02], [x, 0.0, palm as f32]],
+            [0.006, 0.005],
         ));
     }
     let outline = outline.line([-0.8 * wide, 0.0], Seam(30));
