@@ -158,7 +158,7 @@ pub fn over_garments(
                 missed,
                 refusal: match (&mended, &fill) {
                     (Err(error), _) => Some(error.to_string()),
-                    (Ok(_), None) => Some("nothing was filled".into()),
+                    (Ok(_), None) => Some("another loop or nothing was filled".into()),
                     _ => None,
                 },
                 fill,
@@ -230,9 +230,25 @@ fn loop_centroid(mesh: &TriMesh, at: &Vec3) -> Vec3 {
 }
 
 fn fill(intact: &TriMesh, kept: &TriMesh, lost: &TriMesh, mended: &TriMesh) -> Option<GarmentFill> {
+    // A fill of another loop, which a mender may take for the nearest, is no fill of this hole.
+    let own = new_faces(kept, mended);
+    let patch: HashSet<[u32; 3]> = (own.iter())
+        .flat_map(|f| mended.triangle(*f as usize))
+        .map(|p| key(&p))
+        .collect();
+    let remaining: HashSet<[u32; 3]> = kept.positions.iter().map(key).collect();
+    let rim: Vec<_> = lost
+        .positions
+        .iter()
+        .map(key)
+        .filter(|k| remaining.contains(k))
+        .collect();
+    if 2 * rim.iter().filter(|k| patch.contains(*k)).count() < rim.len() {
+        return None;
+    }
     let metrics = ScanMetrics::of(kept, lost, mended, &mut ChaCha8Rng::seed_from_u64(0))?;
     let truth = total_mean_curvature(intact, &new_faces(kept, intact));
-    let own = total_mean_curvature(mended, &new_faces(kept, mended));
+    let own = total_mean_curvature(mended, &own);
     Some(GarmentFill {
         metrics,
         mean_curvature: own / truth.max(1e-9),

@@ -11,7 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 /// Drapes simulated before a seed is given up.
-const ATTEMPTS: u32 = 3;
+const ATTEMPTS: u32 = 8;
 /// Most pairs of triangles that may cut each other, ÷ faces.
 const MOST_CROSSINGS: f64 = 0.006;
 /// Most strain of woven cloth.

@@ -21,6 +21,8 @@ const SHAPES: [f64; 4] = [1.0, 0.7, 0.45, 0.3];
 const MARGIN: usize = 4;
 /// Diameter of a moth hole, in edges.
 const MOTH: f64 = 6.0;
+/// A hole's area is at most this many times that of a flat disk with its rim.
+const POUCH: f64 = 1.3;
 /// What paths along edges are longer than straight ones.
 const DETOUR: f64 = 1.04;
 
@@ -144,7 +146,7 @@ fn clean(
         if tied.is_empty() {
             let off = |f: &[u32; 3]| f.iter().any(|v| kept_off[*v as usize]);
             let near = faces.iter().zip(&lost).any(|(f, l)| *l && off(f));
-            let disk = is_disk(&garment.mesh, &lost);
+            let disk = is_disk(&garment.mesh, &lost) && !is_pouch(&garment.mesh, topology, &lost);
             return (!near && disk).then_some(lost);
         }
         // Everything around such a vertex goes.
@@ -209,6 +211,23 @@ fn is_disk(mesh: &TriMesh, lost: &[bool]) -> bool {
         .flat_map(|f| (0..3).map(|k| (f[k].min(f[(k + 1) % 3]), f[k].max(f[(k + 1) % 3]))))
         .collect();
     vertices.len() + own.len() == edges.len() + 1
+}
+
+/// Whether the lost faces are larger than flat cloth within their rim can be, such as the whole end of a finger: no rim tells of it.
+fn is_pouch(mesh: &TriMesh, topology: &Topology, lost: &[bool]) -> bool {
+    let (mut area, mut length) = (0.0, 0.0);
+    for f in (0..mesh.faces.len()).filter(|f| lost[*f]) {
+        let [a, b, c] = mesh.triangle(f);
+        area += 0.5 * (b - a).cross(&(c - a)).norm();
+        for h in darn_geometry::mesh::index::FaceId(f as u32).half_edges() {
+            if topology.twin(h).is_none_or(|t| !lost[t.face().index()]) {
+                let [a, b] =
+                    [topology.origin(h), topology.target(h)].map(|v| mesh.positions[v.index()]);
+                length += (a - b).norm();
+            }
+        }
+    }
+    area > POUCH * length * length / (4.0 * std::f64::consts::PI)
 }
 
 fn parted(garment: &Garment, lost: &[bool], wish: HoleWish, shape: f64) -> CutGarment {

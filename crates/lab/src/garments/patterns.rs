@@ -363,7 +363,7 @@ fn trousers(rng: &mut impl Rng) -> Cut {
         .line([-hip, crotch], Seam(4))
         .line([-cuff, 0.0], Seam(5));
     let (crotch, high) = (crotch as f32, top as f32);
-    let lift: f32 = rng.random_range(0.2..0.7);
+    let lift: f32 = rng.random_range(0.2..0.5);
     let shin = 0.5 * (crotch + 0.1);
     let leg = |side: f32, lift: f32| Limb {
         root: [side * 0.115, 0.0, crotch + 0.08],
