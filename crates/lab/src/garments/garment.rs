@@ -108,7 +108,8 @@ pub fn make(kind: GarmentKind, seed: u64) -> Result<Garment, GarmentError> {
         let sewn = sew(&pattern, &mut rng)?;
         let draped = drape(&pattern, &sewn);
         let upright = |p: &crate::scarffolds::lattice::Vec3f| {
-            Vec3::new(f64::from(p.x), f64::from(p.z), f64::from(-p.y))
+            // Without negative zeros, which welding does not keep.
+            Vec3::new(f64::from(p.x), f64::from(p.z), 0.0 - f64::from(p.y))
         };
         let mesh = TriMesh {
             positions: draped.positions.iter().map(upright).collect(),
