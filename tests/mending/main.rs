@@ -3,6 +3,7 @@
 mod cloth;
 mod editing;
 mod laws;
+mod ragged;
 mod requests;
 mod rims;
 mod tubes;

@@ -71,7 +71,7 @@ impl FairHole {
         budget.spend(LAYERS_WORK * scan.faces.len() as u64)?;
         // No point of the patch is farther from the rim than this.
         let margin = fair.patch.beyond_rim();
-        let fair = fair.clear_of(&layers_near(scan, &region, margin), budget)?;
+        let fair = fair.clear_of(&layers_near(scan, &region, margin, &[]), budget)?;
         let hole = FairHole {
             id,
             denoised: smooth.is_some(),

@@ -12,6 +12,7 @@ use crate::timings::milliseconds;
 use darn_contract::v1;
 use darn_geometry::flatten::Chart;
 use darn_geometry::grid::{self, CELLS, Grid, NormalGrid, Normalisation};
+use darn_geometry::mesh::index::LoopId;
 use darn_geometry::mesh::region::Region;
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
 use darn_geometry::patch::{Patch, PatchPlan, PatchWork, Pull};
@@ -28,6 +29,8 @@ const FILL_WORK: u64 = 20_000_000;
 pub struct Hole {
     /// The loop's id.
     pub id: u32,
+    /// Faces of the scan at the rim that are no part of its cloth: the patch starts at the sound edge beneath them.
+    pub left_faces: usize,
     /// The cloth around it.
     pub region: Region,
     /// The region laid flat.
@@ -48,6 +51,8 @@ pub struct Hole {
     pub timings: v1::HoleTimings,
     /// Whether the network is given the cloth without the scanner's noise.
     pub denoised: bool,
+    /// The borders of the islands in the hole: loose pieces of the scan that the patch meets.
+    pub islands: Vec<LoopId>,
     /// The rim on the chart's unit square.
     pub rim_uv: Vec<Vec2>,
     /// A smooth fill of the grid, network's units.

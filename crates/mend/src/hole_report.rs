@@ -15,7 +15,7 @@ use crate::timings::milliseconds;
 use crate::welded_scan::{WeldedScan, kind};
 use darn_contract::v1;
 use darn_geometry::mesh::index::VertexId;
-use darn_geometry::mesh::loops::LoopKind;
+use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind};
 use darn_geometry::patch::Patch;
 use darn_geometry::patch::quality::{self, Quality};
 
@@ -82,6 +82,7 @@ impl<'a> PatchDraft<'a> {
             anchors: kept.anchors,
             edits: kept.edits,
             doubts: doubts(&patch, &quality),
+            left_faces: hole.charted().map_or(0, |hole| hole.left_faces) as u32,
         };
         Ok(FilledHole {
             hole,
@@ -138,8 +139,11 @@ fn loose_pieces_note(
     budget: &Budget,
 ) -> Result<Option<String>, Exhausted> {
     let rim = &welded.loops[hole.id() as usize];
-    let others =
-        (welded.loops.iter()).filter(|l| l.kind == LoopKind::Outer && l.component != rim.component);
+    let islands = hole.charted().map_or(&[][..], |hole| &hole.islands);
+    let is_loose = |l: &&BoundaryLoop| {
+        l.kind == LoopKind::Outer && l.component != rim.component && !islands.contains(&l.id)
+    };
+    let others = welded.loops.iter().filter(is_loose);
     let mut others = others.peekable();
     if others.peek().is_none() {
         return Ok(None);
@@ -181,6 +185,29 @@ fn loose_pieces_note(
     )))
 }
 
+/// Which pieces of the scan were no part of the cloth at a hole's rim, and which lie loose and are.
+fn rim_notes(hole: &Hole) -> Vec<String> {
+    let mut notes = Vec::new();
+    if hole.left_faces > 0 {
+        notes.push(format!(
+            "{} triangle(s) at the rim are no part of the cloth's edge (spikes, threads or flaps); they were kept, and the \
+             new cloth starts at the sound edge beneath them",
+            hole.left_faces
+        ));
+    }
+    if !hole.islands.is_empty() {
+        let borders: Vec<String> = (hole.islands.iter().take(MAX_NAMED))
+            .map(ToString::to_string)
+            .collect();
+        notes.push(format!(
+            "{} loose piece(s) of the scan lie in the hole as part of its cloth (their borders: loop {}); the new cloth meets them",
+            hole.islands.len(),
+            borders.join(", ")
+        ));
+    }
+    notes
+}
+
 /// What a person should look at before trusting the patch.
 fn notes(hole: HoleRef, quality: &Quality) -> Vec<String> {
     let mut notes = Vec::new();
@@ -194,6 +221,9 @@ fn notes(hole: HoleRef, quality: &Quality) -> Vec<String> {
             "the scan is noisy: the cloth around the hole was seen without that noise, its rim was kept"
                 .into(),
         );
+    }
+    if let Some(hole) = hole.charted() {
+        notes.extend(rim_notes(hole));
     }
     let most = hole.charted().map_or(1.0, |hole| hole.chart.stretch_max);
     if most > SUSPICIOUS {

@@ -27,6 +27,7 @@ mod fill_hole;
 mod hole;
 mod hole_report;
 mod inpainter;
+mod islands;
 mod limits;
 mod mender;
 mod moved_fill;

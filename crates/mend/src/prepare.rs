@@ -6,6 +6,7 @@ use std::time::Instant;
 use crate::edit::{HoleCells, ReachLimit, RimPoint};
 use crate::error::MendError;
 use crate::hole::{Hole, UneditedCloths};
+use crate::islands::Islands;
 use crate::mender::Call;
 use crate::timings::milliseconds;
 use crate::welded_scan::WeldedScan;
@@ -14,10 +15,13 @@ use darn_contract::v1;
 use darn_geometry::flatten::{self, Chart, FlattenError};
 use darn_geometry::grid::{self, CELLS, Grid, Normalisation};
 use darn_geometry::mesh::denoise::denoise;
-use darn_geometry::mesh::index::LoopId;
+use darn_geometry::mesh::index::{FaceId, LoopId};
 use darn_geometry::mesh::layers::layers_near;
-use darn_geometry::mesh::region::{self, Region, RegionError};
+use darn_geometry::mesh::region::{self, BoundedMesh, Region, RegionError};
+use darn_geometry::mesh::sound_hole::SoundHole;
+use darn_geometry::mesh::spikes::spikes;
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
+use darn_geometry::misfit::{flaps, overlapping_lip};
 use darn_geometry::patch::{self, PatchError, PatchMesh, PatchMetric};
 use darn_geometry::polygon::{extent, inside};
 
@@ -34,34 +38,123 @@ const COLLAR: f64 = 0.2;
 const TUBE_STRETCH: f64 = 1.05;
 /// Tries with smaller and smaller regions.
 const MAX_TRIES: usize = 4;
+/// Tries with more and more of the cloth at the rim left out.
+const MISFIT_SEARCHES: usize = 4;
 /// Nanoseconds of work of a grid and its plates.
 const GRID_WORK: u64 = 9_000_000;
 /// Nanoseconds of work a face of the scan in the search for other layers near a hole.
 const LAYERS_WORK: u64 = 10;
 
-/// Prepares the hole of a loop. Tries smaller and smaller regions when one gives no usable chart, and at last the cloth
-/// with the scanner's noise.
+/// Prepares the hole of a loop, from the sound edge of its cloth: pieces at the rim that do not belong to it are left
+/// out. Where that gives no hole, from the rim as it was scanned.
 ///
 /// # Errors
 /// `Region`, `Flatten`, `TooLittleKnown` or `Patch`, whichever stage fails; of several tries the last one's, of the
 /// denoised cloth. `Exhausted`.
 pub fn prepare_hole(welded: &WeldedScan, id: u32, call: Call) -> Result<Hole, MendError> {
-    let reach = reach_for(estimated_extent(welded, id, call.budget)?);
-    let hole = without_noise(call.budget, |denoise| {
-        let preparation = Preparation {
-            welded,
-            id,
-            denoise,
-            call,
+    let scanned = welded.bounded();
+    let rim = &welded.loops[id as usize];
+    let mut left = spikes(scanned.mesh, scanned.topology, rim, call.budget)?;
+    let mut outcome = None;
+    for searches_left in (0..MISFIT_SEARCHES).rev() {
+        let sound = SoundHole::without(&scanned, rim, left.clone(), call.budget)?;
+        if sound.is_none() && !left.is_empty() {
+            break;
+        }
+        let cloth = match &sound {
+            None => scanned,
+            Some(sound) => BoundedMesh {
+                topology: &sound.topology,
+                loops: &sound.loops,
+                ..scanned
+            },
         };
-        preparation.hole(reach)
-    })?;
+        let cloth = Cloth {
+            whole: &cloth,
+            left: sound.as_ref().map_or(&[], |s| &s.left),
+            searches_left,
+        };
+        match cloth.prepare(id, call) {
+            Ok(Prepared::Misfit(misfit)) => left.extend(misfit),
+            Ok(Prepared::Hole(hole)) => {
+                outcome = Some(Ok(*hole));
+                break;
+            }
+            Err(error) => {
+                outcome = Some(Err(error));
+                break;
+            }
+        }
+    }
+    let scanned = Cloth {
+        whole: &scanned,
+        left: &[],
+        searches_left: 0,
+    };
+    let hole = match outcome {
+        Some(Err(MendError::Exhausted(exhausted))) => return Err(exhausted.into()),
+        Some(Err(error)) if !left.is_empty() => scanned.hole(id, call).map_err(|_| error),
+        Some(outcome) => outcome,
+        None => scanned.hole(id, call),
+    }?;
     call.budget.hold(hole.bytes())?;
     Ok(hole)
 }
 
+/// A scan's cloth without the faces at a hole's rim that do not belong to it.
+struct Cloth<'a> {
+    whole: &'a BoundedMesh<'a>,
+    /// The faces left out, ascending; they are at no vertex of `whole`.
+    left: &'a [FaceId],
+    /// How many more searches for such faces may follow.
+    searches_left: usize,
+}
+
+/// What preparing a hole gives.
+enum Prepared {
+    /// The hole.
+    Hole(Box<Hole>),
+    /// Nothing yet: more faces at the rim do not belong to the cloth.
+    Misfit(Vec<FaceId>),
+}
+
+impl Cloth<'_> {
+    /// Prepares the hole of a loop. Tries smaller and smaller regions when one gives no usable chart, and at last the
+    /// cloth with the scanner's noise.
+    fn prepare(&self, id: u32, call: Call) -> Result<Prepared, MendError> {
+        let reach = reach_for(estimated_extent(self.whole, id, call.budget)?);
+        without_noise(call.budget, |denoise| {
+            let preparation = Preparation {
+                cloth: self,
+                id,
+                denoise,
+                call,
+            };
+            preparation.hole(reach)
+        })
+    }
+
+    /// The triangles of the patch on the chart.
+    fn triangulated(&self, id: u32, flat: &FlatRegion, call: Call) -> Result<TimedMesh, MendError> {
+        let started = Instant::now();
+        let mesh = PatchMesh::in_scan(self.whole.mesh, flat.seen(), &flat.chart, call);
+        Ok(TimedMesh {
+            mesh: mesh.map_err(MendError::patch(id))?,
+            milliseconds: milliseconds(started),
+        })
+    }
+
+    /// The hole of a loop when no search for misfits is left.
+    fn hole(&self, id: u32, call: Call) -> Result<Hole, MendError> {
+        match self.prepare(id, call)? {
+            Prepared::Hole(hole) => Ok(*hole),
+            Prepared::Misfit(_) => Err(MendError::patch(id)(PatchError::RimCrosses)),
+        }
+    }
+}
+
 /// Takes the scanner's noise off a mesh; `None` where it has none, or where the noise is to stay.
-type Denoise<'a> = &'a dyn Fn(&TriMesh) -> Result<Option<TriMesh>, Exhausted>;
+pub type Denoise<'a> = &'a dyn Fn(&TriMesh) -> Result<Option<TriMesh>, Exhausted>;
 
 /// The result for the cloth without the scanner's noise; where that cannot be used, for the cloth as it was scanned.
 fn without_noise<T>(
@@ -84,43 +177,80 @@ fn without_noise<T>(
 
 /// A loop to prepare, and how.
 struct Preparation<'a> {
-    welded: &'a WeldedScan,
+    cloth: &'a Cloth<'a>,
     id: u32,
     denoise: Denoise<'a>,
     call: Call<'a>,
 }
 
 /// The cloth around a hole, laid flat.
-struct FlatRegion {
-    region: Region,
+#[derive(Clone)]
+pub struct FlatRegion {
+    /// The region.
+    pub region: Region,
     /// The region without the scanner's noise, where there is some.
-    smooth: Option<Region>,
-    chart: Chart,
+    pub smooth: Option<Region>,
+    /// The region's layout in the plane.
+    pub chart: Chart,
+    /// The borders of the islands in it, as loops of the scan.
+    pub islands: Vec<LoopId>,
     timings: v1::HoleTimings,
 }
 
+/// The triangles of a patch, and the time that they took.
+struct TimedMesh {
+    mesh: PatchMesh,
+    milliseconds: f64,
+}
+
 /// The grid of a hole and what is computed from it.
-struct SampledGrid {
+pub struct SampledGrid {
     grid: Grid,
-    normal: Normalisation,
-    cells: HoleCells,
-    base: Option<Vec<[f32; 3]>>,
+    /// Converts between scene space and the network's units.
+    pub normal: Normalisation,
+    /// The grid's cells that lie in the hole.
+    pub cells: HoleCells,
+    /// A smooth fill of the grid, network's units.
+    pub base: Option<Vec<[f32; 3]>>,
     metric: Option<PatchMetric>,
     milliseconds: f64,
 }
 
 impl Preparation<'_> {
     /// The hole, with a region of this reach or a smaller one; the reach is in scene units.
-    fn hole(&self, mut reach: f64) -> Result<Hole, MendError> {
+    fn hole(&self, widest: f64) -> Result<Prepared, MendError> {
+        let mut reach = widest;
         let mut tries = 0;
         loop {
-            let outcome = self.flat_region(reach).and_then(|flat| self.sampled(flat));
+            let outcome = self.flat_region(reach).and_then(|flat| {
+                let misfit = self.misfit(|| flaps(flat.seen(), &flat.chart, self.call.budget))?;
+                match misfit {
+                    Some(faces) => Ok(Prepared::Misfit(faces)),
+                    None => Ok(Prepared::Hole(Box::new(self.sampled(flat)?))),
+                }
+            });
             tries += 1;
             match outcome {
                 Err(error) if tries < MAX_TRIES && may_shrink(&error) => reach *= SHRINK,
+                Err(error) if rim_crosses(&error) => {
+                    let flat = self.flat_region(widest)?;
+                    let lip = || overlapping_lip(flat.seen(), &flat.chart, self.call.budget);
+                    return self.misfit(lip)?.map(Prepared::Misfit).ok_or(error);
+                }
                 outcome => return outcome,
             }
         }
+    }
+
+    /// The faces that a search finds; `None` when it finds none, or no search is left.
+    fn misfit(
+        &self,
+        search: impl Fn() -> Result<Vec<FaceId>, Exhausted>,
+    ) -> Result<Option<Vec<FaceId>>, Exhausted> {
+        if self.cloth.searches_left == 0 {
+            return Ok(None);
+        }
+        Ok(Some(search()?).filter(|faces| !faces.is_empty()))
     }
 
     /// Grows and flattens the region; once more when the chart shows that the reach did not suit the hole.
@@ -146,7 +276,7 @@ impl Preparation<'_> {
     /// Grows and flattens a region of this reach. Where it wraps around a tube it is cut open, if it lies flat so.
     fn flattened(&self, reach: f64) -> Result<FlatRegion, MendError> {
         let started = Instant::now();
-        let region = grown(self.welded, self.id, reach, self.call.budget);
+        let region = region::grow(self.cloth.whole, LoopId(self.id), reach, self.call.budget);
         let grown_ms = milliseconds(started);
         let wraps = match &region {
             Ok(region) => region.wraps,
@@ -161,8 +291,8 @@ impl Preparation<'_> {
     /// The region of this reach around a tube, cut open and laid flat; `None` where it does not lie flat.
     fn cut_open(&self, reach: f64) -> Result<Option<FlatRegion>, MendError> {
         let started = Instant::now();
-        let (whole, rim) = (self.welded.bounded(), LoopId(self.id));
-        let region = region::grow_cut_open(&whole, rim, reach, self.call.budget)
+        let (whole, rim) = (self.cloth.whole, LoopId(self.id));
+        let region = region::grow_cut_open(whole, rim, reach, self.call.budget)
             .map_err(MendError::region(self.id))?;
         let Some(region) = region else {
             return Ok(None);
@@ -194,24 +324,53 @@ impl Preparation<'_> {
             region,
             smooth,
             chart,
+            islands: Vec::new(),
             timings,
         })
     }
 
-    /// Samples the grid and plans the patch.
+    /// Samples the grid and plans the patch, with the islands in the hole where there are any.
     fn sampled(&self, flat: FlatRegion) -> Result<Hole, MendError> {
-        let (id, welded, call) = (self.id, self.welded, self.call);
-        let seen = flat.smooth.as_ref().unwrap_or(&flat.region);
-        let rim_uv = flat.rim_uv();
-        let sample = || sample(id, seen, &flat.chart, call.budget);
-        let triangulate = || {
-            let started = Instant::now();
-            let mesh = PatchMesh::in_scan(&welded.surface.mesh, seen, &flat.chart, call);
-            mesh.map(|mesh| (mesh, milliseconds(started)))
+        let (cloth, id, call) = (self.cloth, self.id, self.call);
+        let (sampled, mesh) = rayon::join(
+            || sample(id, &flat, call.budget),
+            || cloth.triangulated(id, &flat, call),
+        );
+        let (sampled, mesh) = (sampled?, mesh?);
+        let islands = Islands {
+            whole: cloth.whole,
+            rim: LoopId(id),
+            denoise: self.denoise,
+            call,
         };
-        let (sampled, mesh) = rayon::join(sample, triangulate);
-        let sampled = sampled?;
-        let (mesh, triangulate_ms) = mesh.map_err(MendError::patch(id))?;
+        let Some(joined) = islands.joined(&flat, &sampled)? else {
+            return self.planned(flat, sampled, mesh);
+        };
+        match (
+            sample(id, &joined, call.budget),
+            cloth.triangulated(id, &joined, call),
+        ) {
+            (Ok(sampled), Ok(mesh)) => self.planned(joined, sampled, mesh),
+            (Err(MendError::Exhausted(exhausted)), _)
+            | (_, Err(MendError::Exhausted(exhausted))) => Err(exhausted.into()),
+            // Nothing can be laid between island and rim.
+            _ => self.planned(flat, sampled, mesh),
+        }
+    }
+
+    /// Plans the patch.
+    fn planned(
+        &self,
+        flat: FlatRegion,
+        sampled: SampledGrid,
+        TimedMesh {
+            mesh,
+            milliseconds: triangulate_ms,
+        }: TimedMesh,
+    ) -> Result<Hole, MendError> {
+        let (id, scan, call) = (self.id, self.cloth.whole.mesh, self.call);
+        let seen = flat.seen();
+        let rim_uv = flat.rim_uv();
         let started = Instant::now();
         let plan = (mesh.plan(seen, &flat.chart, sampled.metric.as_ref(), call))
             .and_then(|plan| match &flat.smooth {
@@ -221,9 +380,8 @@ impl Preparation<'_> {
             .map_err(MendError::patch(id))?;
         // The largest distance that cloth of the hole's extent can have from its rim.
         let beyond = 0.5 * extent(&rim_uv) * flat.chart.frame.side;
-        let scan = &welded.surface.mesh;
         call.budget.spend(LAYERS_WORK * scan.faces.len() as u64)?;
-        let plan = plan.with_layers(&layers_near(scan, &flat.region, beyond));
+        let plan = plan.with_layers(&layers_near(scan, &flat.region, beyond, self.cloth.left));
         let patch = triangulate_ms + milliseconds(started);
         let timings = v1::HoleTimings {
             raster: sampled.milliseconds,
@@ -231,7 +389,12 @@ impl Preparation<'_> {
             ..flat.timings
         };
         let denoised = flat.smooth.is_some();
-        let FlatRegion { region, chart, .. } = flat;
+        let FlatRegion {
+            region,
+            chart,
+            islands,
+            ..
+        } = flat;
         let rim = region.rim.iter().map(|v| RimPoint {
             flat: chart.flat[*v as usize],
             position: region.mesh.positions[*v as usize],
@@ -239,6 +402,7 @@ impl Preparation<'_> {
         let reach = ReachLimit::new(rim);
         Ok(Hole {
             id,
+            left_faces: self.cloth.left.len(),
             plan,
             report: grid_report(&sampled, &rim_uv),
             grid: sampled.grid,
@@ -248,6 +412,7 @@ impl Preparation<'_> {
             timings,
             base: sampled.base,
             denoised,
+            islands,
             rim_uv,
             unedited: UneditedCloths::default(),
             region,
@@ -257,6 +422,11 @@ impl Preparation<'_> {
 }
 
 impl FlatRegion {
+    /// The region as the chart shows it: without the scanner's noise.
+    pub fn seen(&self) -> &Region {
+        self.smooth.as_ref().unwrap_or(&self.region)
+    }
+
     /// The rim on the chart's unit square.
     fn rim_uv(&self) -> Vec<Vec2> {
         rim_uv(&self.region, &self.chart)
@@ -268,13 +438,9 @@ fn rim_uv(region: &Region, chart: &Chart) -> Vec<Vec2> {
 }
 
 /// Samples the grid, and continues positions and metric into its unknown cells.
-fn sample(
-    id: u32,
-    seen: &Region,
-    chart: &Chart,
-    budget: &Budget,
-) -> Result<SampledGrid, MendError> {
+fn sample(id: u32, flat: &FlatRegion, budget: &Budget) -> Result<SampledGrid, MendError> {
     let started = Instant::now();
+    let (seen, chart) = (flat.seen(), &flat.chart);
     let rim_uv = rim_uv(seen, chart);
     budget.spend(GRID_WORK)?;
     let grid = flatten::raster(&seen.mesh, chart);
@@ -315,11 +481,6 @@ fn grid_report(sampled: &SampledGrid, rim_uv: &[Vec2]) -> v1::GridReport {
     }
 }
 
-/// The region around a loop, of this reach in scene units.
-fn grown(welded: &WeldedScan, id: u32, reach: f64, budget: &Budget) -> Result<Region, RegionError> {
-    region::grow(&welded.bounded(), LoopId(id), reach, budget)
-}
-
 /// Reach of the region around a hole of this extent; both in scene units.
 fn reach_for(extent: f64) -> f64 {
     0.5 * extent * (1.0 / HOLE_SHARE - 1.0)
@@ -330,9 +491,9 @@ fn reach_for(extent: f64) -> f64 {
 ///
 /// # Errors
 /// `Exhausted`.
-fn estimated_extent(welded: &WeldedScan, id: u32, budget: &Budget) -> Result<f64, Exhausted> {
-    let round = welded.loops[id as usize].length / std::f64::consts::PI;
-    let collar = match grown(welded, id, COLLAR * reach_for(round), budget) {
+fn estimated_extent(whole: &BoundedMesh, id: u32, budget: &Budget) -> Result<f64, Exhausted> {
+    let round = whole.loops[id as usize].length / std::f64::consts::PI;
+    let collar = match region::grow(whole, LoopId(id), COLLAR * reach_for(round), budget) {
         Ok(collar) => collar,
         Err(RegionError::Exhausted(exhausted)) => return Err(exhausted),
         Err(_) => return Ok(round),
@@ -348,9 +509,12 @@ fn estimated_extent(welded: &WeldedScan, id: u32, budget: &Budget) -> Result<f64
 fn may_shrink(error: &MendError) -> bool {
     match error {
         MendError::Flatten { .. } => true,
-        MendError::Patch { source, .. } => *source == PatchError::RimCrosses,
-        _ => false,
+        error => rim_crosses(error),
     }
+}
+
+fn rim_crosses(error: &MendError) -> bool {
+    matches!(error, MendError::Patch { source, .. } if *source == PatchError::RimCrosses)
 }
 
 #[cfg(test)]

@@ -2,15 +2,16 @@
 
 use std::collections::HashSet;
 
-use super::index::VertexId;
+use super::index::{FaceId, VertexId};
 use super::region::Region;
 use super::{TriMesh, Vec3};
 
 /// The faces of the whole mesh outside `region` whose bounding boxes come within `margin` (scene units) of the rim's,
 /// as a mesh.
 ///
-/// A face with a vertex on the rim is left out: it touches the patch there and does not cut it.
-pub fn layers_near(whole: &TriMesh, region: &Region, margin: f64) -> TriMesh {
+/// A face with a vertex on the rim is left out: it touches the patch there and does not cut it. But the faces `at_rim`
+/// (ascending) hang on the rim like the patch, and are layers wherever they are.
+pub fn layers_near(whole: &TriMesh, region: &Region, margin: f64, at_rim: &[FaceId]) -> TriMesh {
     let rim = || (region.rim.iter()).map(|v| region.mesh.positions[*v as usize]);
     let low = rim().fold(Vec3::repeat(f64::MAX), |m, p| m.inf(&p)) - Vec3::repeat(margin);
     let high = rim().fold(Vec3::repeat(f64::MIN), |m, p| m.sup(&p)) + Vec3::repeat(margin);
@@ -19,14 +20,17 @@ pub fn layers_near(whole: &TriMesh, region: &Region, margin: f64) -> TriMesh {
     let on_rim: HashSet<VertexId> = (region.rim.iter())
         .map(|v| region.vertices[*v as usize])
         .collect();
-    let near = |(face, own): &(&[u32; 3], bool)| {
+    let near = |(k, (face, own)): &(usize, (&[u32; 3], bool))| {
+        if at_rim.binary_search(&FaceId(*k as u32)).is_ok() {
+            return true;
+        }
         let [a, b, c] = face.map(|v| whole.positions[v as usize]);
         let (least, most) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));
         let apart = (0..3).any(|k| most[k] < low[k] || least[k] > high[k]);
         !own && !apart && !face.iter().any(|v| on_rim.contains(&VertexId(*v)))
     };
-    let faces = whole.faces.iter().zip(own).filter(near);
-    whole.part(faces.map(|(face, _)| *face))
+    let faces = whole.faces.iter().zip(own).enumerate().filter(near);
+    whole.part(faces.map(|(_, (face, _))| *face))
 }
 
 #[cfg(test)]
@@ -45,7 +49,7 @@ mod tests {
         let region = region_around_hole(&mesh, 0.2);
         assert!(region.faces.len() < holed.faces.len());
 
-        let near = layers_near(&mesh, &region, 0.06);
+        let near = layers_near(&mesh, &region, 0.06, &[]);
         let above = |p: &&Vec3| p.z > 0.0;
         assert!(!near.faces.is_empty());
         assert_eq!(
@@ -57,6 +61,6 @@ mod tests {
                 .iter()
                 .all(|p| (p.xy() - Vec3::repeat(0.5).xy()).amax() < 0.25)
         );
-        assert_eq!(layers_near(&mesh, &region, 0.04).faces, [[0; 3]; 0]);
+        assert_eq!(layers_near(&mesh, &region, 0.04, &[]).faces, [[0; 3]; 0]);
     }
 }

@@ -130,6 +130,23 @@ fn diameter(points: &[Vec3]) -> f64 {
     longest
 }
 
+impl BoundaryLoop {
+    /// The same loop along other half-edges: id, turning and kind stay, everything else is measured.
+    pub(super) fn along(
+        &self,
+        mesh: &TriMesh,
+        topology: &Topology,
+        half_edges: Vec<HalfEdgeId>,
+    ) -> BoundaryLoop {
+        BoundaryLoop {
+            id: self.id,
+            turning: self.turning,
+            kind: self.kind,
+            ..measured(mesh, topology, half_edges)
+        }
+    }
+}
+
 /// A loop with its measures; its id, turning and kind are left for the caller to set.
 fn measured(mesh: &TriMesh, topology: &Topology, half_edges: Vec<HalfEdgeId>) -> BoundaryLoop {
     let vertices: Vec<VertexId> = half_edges.iter().map(|&h| topology.origin(h)).collect();

@@ -90,6 +90,7 @@ impl Piece {
                 faces,
                 rim,
                 holes,
+                islands: Vec::new(),
                 outer: Vec::new(),
                 reach,
                 wraps: false,

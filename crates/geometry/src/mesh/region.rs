@@ -20,12 +20,15 @@ pub struct Region {
     /// Per vertex of the piece its vertex of the whole mesh. A vertex where the piece touches itself only in a point, or
     /// along which it is cut open, appears twice.
     pub vertices: Vec<VertexId>,
-    /// Per face of the piece its face of the whole mesh, ascending.
+    /// Per face of the piece its face of the whole mesh: ascending, then those of islands.
     pub faces: Vec<FaceId>,
     /// Vertices of the piece along the hole asked for, in its loop's order.
     pub rim: Vec<u32>,
     /// The other holes that lie wholly inside, each along its half-edges.
     pub holes: Vec<Vec<u32>>,
+    /// The borders of islands: pieces of cloth that lie loose in the hole and belong to it, each along its half-edges.
+    /// [`grow`] finds none; [`Region::with_island`] adds one.
+    pub islands: Vec<Vec<u32>>,
     /// The one outer loop, along its half-edges; may follow loops of the whole mesh where the piece is cut by them.
     pub outer: Vec<u32>,
     /// The reach that was used, scene units: the one asked for unless that was below three edges, beyond the mesh, or

@@ -3,7 +3,7 @@
 //! Lengths are scene units. Shapes are triangle soups as a file might hold them: [`weld`](super::weld::weld) them
 //! first. Everything random is determined by its seed.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::f64::consts::TAU;
 
 use rand::{Rng, SeedableRng};
@@ -55,6 +55,104 @@ pub fn tube(n: usize, keep: impl Fn(f64, f64) -> bool) -> TriMesh {
         let angle = if u == 1.0 { 0.0 } else { u * TAU };
         Vec3::new(angle.cos(), angle.sin(), 4.0 * v)
     })
+}
+
+/// A flat sheet, `n` squares a side, with a square tongue that was torn from its middle but for one side: a third of
+/// the sheet wide, parted from it by a gap of a square, and turned up by `angle` (radians) from its hinge.
+///
+/// `n` should be at least 9. The hinge is the line v = `tongue_hinge(n)`.
+pub fn tongue(n: usize, angle: f64) -> TriMesh {
+    let (first, last) = (n / 3, n - n / 3);
+    let square = |x: f64| (x * n as f64) as usize;
+    let gap = |u: f64, v: f64| {
+        let (i, j) = (square(u), square(v));
+        let beside = i == first - 1 || i == last;
+        let above = j == last && (first - 1..=last).contains(&i);
+        above || (beside && (first..last).contains(&j))
+    };
+    let at = |k: usize| k as f64 / n as f64;
+    let tongue = move |u: f64, v: f64| {
+        let inside = u > at(first) - 1e-9 && u < at(last) + 1e-9;
+        inside && v > at(first) && v < at(last) + 1e-9
+    };
+    let place = |u: f64, v: f64| {
+        let along = if tongue(u, v) {
+            v - tongue_hinge(n)
+        } else {
+            0.0
+        };
+        Vec3::new(u, v - along + along * angle.cos(), along * angle.sin())
+    };
+    sheet(n, |u, v| !gap(u, v), place)
+}
+
+/// Where the hinge of a [`tongue`] lies, v.
+pub fn tongue_hinge(n: usize) -> f64 {
+    (n / 3) as f64 / n as f64
+}
+
+/// A flat sheet, `n` squares a side, with a slit along the middle two fifths of the line v = ½ whose upper lip is drawn
+/// over the lower one by up to `overlap`, and lies above it by a fifth of that.
+pub fn overlapping_slit(n: usize, overlap: f64) -> TriMesh {
+    let middle = n / 2;
+    let whole = sheet(n, |_, _| true, |u, v| Vec3::new(u, v, 0.0));
+    let mut mesh = whole.clone();
+    let in_slit = |v: u32| {
+        let (i, j) = (v as usize % (n + 1), v as usize / (n + 1));
+        let share = (i as f64 / n as f64 - 0.3) / 0.4;
+        (j == middle && share > 1e-9 && share < 1.0 - 1e-9).then_some(share)
+    };
+    let mut upper = HashMap::new();
+    for face in &mut mesh.faces {
+        let above = face.iter().any(|v| *v as usize / (n + 1) > middle);
+        for v in face.iter_mut().filter(|_| above) {
+            if in_slit(*v).is_some() {
+                *v = *upper.entry(*v).or_insert_with(|| {
+                    mesh.positions.push(whole.positions[*v as usize]);
+                    mesh.positions.len() as u32 - 1
+                });
+            }
+        }
+    }
+    // The upper half follows its lip, less and less.
+    for (v, p) in mesh.positions.iter_mut().enumerate() {
+        // The upper lip's vertices come last.
+        if v / (n + 1) > middle {
+            let share = ((p.x - 0.3) / 0.4).clamp(0.0, 1.0);
+            let pull = overlap * (share * TAU / 2.0).sin().powi(2) * (1.0 - 2.0 * (p.y - 0.5));
+            *p += Vec3::new(0.0, -pull, 0.2 * pull);
+        }
+    }
+    mesh
+}
+
+/// The mesh with spikes at its boundary: at half of the boundary edges whose ends are `frayed`, a triangle with its
+/// tip about `length` (scene units) beyond the edge, up to a third of that aside and above or below the cloth.
+pub fn fray(mesh: &TriMesh, frayed: impl Fn(&Vec3) -> bool, length: f64, seed: u64) -> TriMesh {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let sides = |[a, b, c]: [u32; 3]| [(a, b, c), (b, c, a), (c, a, b)];
+    let inner: HashSet<(u32, u32)> = (mesh.faces.iter())
+        .flat_map(|f| sides(*f))
+        .map(|(a, b, _)| (a, b))
+        .collect();
+    let mut spiked = mesh.clone();
+    for (a, b, c) in mesh.faces.iter().flat_map(|f| sides(*f)) {
+        let [p, q, r] = [a, b, c].map(|v| mesh.positions[v as usize]);
+        if inner.contains(&(b, a)) || !frayed(&p) || !frayed(&q) || rng.random_bool(0.5) {
+            continue;
+        }
+        let middle = 0.5 * (p + q);
+        let edge = (q - p).normalize();
+        let out = (middle - r) - edge * edge.dot(&(middle - r));
+        let up = edge.cross(&out).normalize();
+        let aside = |rng: &mut ChaCha8Rng| rng.random_range(-0.33..=0.33);
+        let tip = out.normalize() + edge * aside(&mut rng) + up * aside(&mut rng);
+        spiked.faces.push([b, a, spiked.positions.len() as u32]);
+        spiked
+            .positions
+            .push(middle + tip * length * rng.random_range(0.8..=1.2));
+    }
+    spiked
 }
 
 /// The mesh with every coordinate shifted at random by up to `amount`, scene units; equal positions are shifted

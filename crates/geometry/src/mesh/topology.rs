@@ -106,6 +106,43 @@ impl Topology {
         leaving.flat_map(|&h| [self.target(h), self.origin(h.previous())])
     }
 
+    /// The same mesh as if it did not have the given faces, with the numbers of all others.
+    ///
+    /// The faces are at no vertex, and what they were joined to has a boundary there. `non_manifold` and `component`
+    /// stay as they are.
+    pub(super) fn without(&self, faces: &[FaceId]) -> Self {
+        let mut gone = vec![false; self.component.len()];
+        faces.iter().for_each(|f| gone[f.index()] = true);
+        let kept = |h: &HalfEdgeId| !gone[h.face().index()];
+        let twin = |h: HalfEdgeId| {
+            let twin = self.twin(h).filter(kept);
+            twin.filter(|_| kept(&h))
+        };
+        let mut leaving_start = vec![0];
+        let mut leaving = Vec::with_capacity(self.leaving.len());
+        for v in (0..self.vertex_count() as u32).map(VertexId) {
+            leaving.extend(self.leaving(v).iter().copied().filter(kept));
+            leaving_start.push(leaving.len() as u32);
+        }
+        Self {
+            non_manifold: self.non_manifold.clone(),
+            component: self.component.clone(),
+            components: self.components,
+            twins: (0..self.twins.len() as u32)
+                .map(|h| twin(HalfEdgeId(h)))
+                .collect(),
+            origins: self.origins.clone(),
+            leaving_start,
+            leaving,
+        }
+    }
+
+    /// Per face the edge-connected component it belongs to as its twins are now, numbered by first face, and how many
+    /// there are.
+    pub(super) fn connected(&self) -> (Vec<u32>, usize) {
+        face_components(&self.twins)
+    }
+
     /// Per vertex whether it lies on a boundary (or on no face at all).
     pub fn boundary_vertices(&self) -> Vec<bool> {
         let mut boundary: Vec<bool> = (0..self.vertex_count())

@@ -36,6 +36,7 @@ pub use metric::{PatchMetric, log_stretch};
 pub use plan::{PatchMesh, PatchPlan, plan, stretch_limit};
 pub use pull::{Firmness, Pull};
 pub use triangulate::signed_area;
+pub(crate) use triangulate::{Outline, across};
 
 use darn_budget::{Budget, Exhausted};
 
@@ -111,7 +112,8 @@ impl Default for PatchOptions {
 /// Triangles that close a hole.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Patch {
-    /// Region vertices of the rim, counter-clockwise around the patch; they are the patch's first vertices. Where the
+    /// Region vertices of the rim, counter-clockwise around the patch, then those around islands in the hole; they are the
+    /// patch's first vertices. Where the
     /// rim touches itself, several of them lie at one point and the patch consists of pieces that meet there.
     pub rim: Vec<u32>,
     /// All vertices in the plane of the chart, scene units; empty for a patch without a chart.

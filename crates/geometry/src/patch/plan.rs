@@ -98,6 +98,7 @@ impl PatchMesh {
         let asked = Asked {
             spacing: spacing(region, chart),
             max_points: options.max_vertices,
+            islands: region.islands.iter().map(Vec::len).collect(),
             budget,
         };
         let triangulation = triangulate_pieces(flat, rim_points, &asked)?;
@@ -157,9 +158,10 @@ impl PatchMesh {
 }
 
 /// The rim of a region has the scan on its left and the hole on its right; reversed it runs counter-clockwise around
-/// the patch.
+/// the patch. The borders of islands in the hole follow, also reversed.
 fn reversed_rim(region: &Region) -> Vec<u32> {
-    region.rim.iter().rev().copied().collect()
+    let lines = std::iter::once(&region.rim).chain(&region.islands);
+    lines.flat_map(|line| line.iter().rev().copied()).collect()
 }
 
 fn positions_of(vertices: &[u32], mesh: &TriMesh) -> Vec<Vec3> {

@@ -28,17 +28,70 @@ pub struct Triangulation {
     pub faces: Vec<[u32; 3]>,
 }
 
-/// Triangulates a simple counter-clockwise polygon with inner edges of length about `spacing`, or longer so that there
+/// A polygon with islands in it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Outline {
+    /// Corners of the counter-clockwise polygon, then those of each island, clockwise; scene units.
+    corners: Vec<Vec2>,
+    /// Per corner the next one of its loop.
+    next: Vec<usize>,
+    /// Islands.
+    islands: usize,
+}
+
+impl Outline {
+    /// A polygon; `islands` holds the number of its last corners that bound each island, in order.
+    pub fn new(corners: Vec<Vec2>, islands: &[usize]) -> Outline {
+        let mut next: Vec<usize> = (1..=corners.len()).collect();
+        let mut end = corners.len();
+        for count in islands.iter().rev() {
+            let first = end.saturating_sub(*count);
+            if let Some(last) = next[..end].last_mut() {
+                *last = first;
+            }
+            end = first;
+        }
+        if let Some(last) = next[..end].last_mut() {
+            *last = 0;
+        }
+        Outline {
+            corners,
+            next,
+            islands: islands.len(),
+        }
+    }
+
+    /// Its edges.
+    fn edges(&self) -> impl Iterator<Item = (&Vec2, &Vec2)> {
+        let next = self.next.iter().map(|n| &self.corners[*n]);
+        self.corners.iter().zip(next)
+    }
+
+    /// Its area without the islands'; the chart's units squared.
+    pub fn area(&self) -> f64 {
+        0.5 * self.edges().map(|(a, b)| a.perp(b)).sum::<f64>()
+    }
+}
+
+impl From<&[Vec2]> for Outline {
+    /// Without islands.
+    fn from(polygon: &[Vec2]) -> Outline {
+        Outline::new(polygon.to_vec(), &[])
+    }
+}
+
+/// Triangulates a simple counter-clockwise polygon without its islands, with inner edges of length about `spacing`, or longer so that there
 /// are at most about `max_points` inner points.
 ///
 /// # Errors
-/// `RimCrosses` when the polygon crosses or touches itself.
-pub fn triangulate(
-    polygon: &[Vec2],
+/// `RimCrosses` when the polygon crosses or touches itself or an island.
+pub(super) fn triangulate(
+    outline: &Outline,
     spacing: f64,
     max_points: usize,
 ) -> Result<Triangulation, PatchError> {
-    let area = signed_area(polygon);
+    let polygon = &outline.corners;
+    let area = outline.area();
     if area.is_nan() || area <= 0.0 {
         return Err(PatchError::RimCrosses);
     }
@@ -48,9 +101,9 @@ pub fn triangulate(
         .fold(0.0, f64::max);
     let spacing = spacing.max(extent / FINEST);
     let spacing = spacing.max((area / max_points.max(1) as f64 / 0.75f64.sqrt()).sqrt());
-    let mut points = polygon.to_vec();
-    points.extend(lattice(polygon, spacing));
-    let faces = constrained_delaunay(&points, polygon.len())?;
+    let mut points = polygon.clone();
+    points.extend(lattice(outline, spacing));
+    let faces = constrained_delaunay(&points, outline)?;
     Ok(Triangulation { points, faces })
 }
 
@@ -62,15 +115,16 @@ impl Triangulation {
     ///
     /// # Errors
     /// `Exhausted`: every split looks at all faces.
-    pub fn split_chords(
+    pub(super) fn split_chords(
         &mut self,
-        corners: usize,
+        outline: &Outline,
         budget: &Budget,
         taken: impl Fn(u32, u32) -> bool,
     ) -> Result<(), Exhausted> {
-        let apart = |a: u32, b: u32| {
-            (a as usize + 1) % corners != b as usize && (b as usize + 1) % corners != a as usize
-        };
+        let Outline { corners, next, .. } = outline;
+        let corners = corners.len();
+        let apart =
+            |a: u32, b: u32| next[a as usize] != b as usize && next[b as usize] != a as usize;
         let chord = |faces: &[[u32; 3]]| {
             faces
                 .iter()
@@ -106,6 +160,21 @@ fn halves(face: [u32; 3], edge: (u32, u32), middle: u32) -> Vec<[u32; 3]> {
     }
 }
 
+/// The pairs of corners of an outline that a Delaunay triangulation of its inside joins across it, as indices, the lower
+/// one first; empty when it crosses or touches itself.
+pub(crate) fn across(outline: &Outline) -> Vec<(usize, usize)> {
+    let faces = constrained_delaunay(&outline.corners, outline).unwrap_or_default();
+    let sides = faces
+        .iter()
+        .flat_map(|f| [(f[0], f[1]), (f[1], f[2]), (f[2], f[0])]);
+    let sides = sides.map(|(a, b)| (a as usize, b as usize));
+    let apart = |(a, b): &(usize, usize)| outline.next[*a] != *b && outline.next[*b] != *a;
+    // Every inner edge comes once in either direction.
+    sides
+        .filter(|side| side.0 < side.1 && apart(side))
+        .collect()
+}
+
 /// Signed area of a polygon (shoelace formula), in its units squared; positive when counter-clockwise.
 pub fn signed_area(polygon: &[Vec2]) -> f64 {
     let next = polygon.iter().cycle().skip(1);
@@ -117,10 +186,10 @@ pub fn signed_area(polygon: &[Vec2]) -> f64 {
 }
 
 /// Points of a triangular lattice inside the polygon, at a distance from its edges.
-fn lattice(polygon: &[Vec2], spacing: f64) -> Vec<Vec2> {
-    let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
+fn lattice(outline: &Outline, spacing: f64) -> Vec<Vec2> {
+    let polygon = &outline.corners;
     let tree = RTree::bulk_load(
-        edges
+        (outline.edges())
             .map(|(a, b)| Line::new([a.x, a.y], [b.x, b.y]))
             .collect(),
     );
@@ -132,7 +201,7 @@ fn lattice(polygon: &[Vec2], spacing: f64) -> Vec<Vec2> {
     for row in 0..=((high.y - low.y) / rise) as usize {
         let y = low.y + (row as f64 + 0.5) * rise;
         let shift = if row % 2 == 0 { 0.25 } else { 0.75 };
-        for span in scan_line(polygon, y).chunks_exact(2) {
+        for span in scan_line(outline, y).chunks_exact(2) {
             let first = ((span[0] - low.x) / spacing - shift).ceil();
             let last = ((span[1] - low.x) / spacing - shift).floor();
             for column in first as i64..=last as i64 {
@@ -151,10 +220,8 @@ fn lattice(polygon: &[Vec2], spacing: f64) -> Vec<Vec2> {
 }
 
 /// The x coordinates where a horizontal line enters and leaves the polygon, ascending.
-fn scan_line(polygon: &[Vec2], y: f64) -> Vec<f64> {
-    let mut xs: Vec<f64> = polygon
-        .iter()
-        .zip(polygon.iter().cycle().skip(1))
+fn scan_line(outline: &Outline, y: f64) -> Vec<f64> {
+    let mut xs: Vec<f64> = (outline.edges())
         .filter(|(a, b)| (a.y <= y) != (b.y <= y))
         .map(|(a, b)| a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x))
         .collect();
@@ -176,8 +243,10 @@ impl HasPosition for IndexedPoint {
     }
 }
 
-/// Delaunay triangles inside the polygon of the first `rim` points.
-fn constrained_delaunay(points: &[Vec2], rim: usize) -> Result<Vec<[u32; 3]>, PatchError> {
+/// Delaunay triangles inside the outline of the first points.
+fn constrained_delaunay(points: &[Vec2], outline: &Outline) -> Result<Vec<[u32; 3]>, PatchError> {
+    let next = &outline.next;
+    let rim = next.len();
     let vertices = (0u32..)
         .zip(points)
         .map(|(index, p)| IndexedPoint {
@@ -185,7 +254,7 @@ fn constrained_delaunay(points: &[Vec2], rim: usize) -> Result<Vec<[u32; 3]>, Pa
             index,
         })
         .collect();
-    let edges = (0..rim).map(|k| [k, (k + 1) % rim]).collect();
+    let edges = (0..rim).map(|k| [k, next[k]]).collect();
     let mut crossed = false;
     let cdt = ConstrainedDelaunayTriangulation::<IndexedPoint>::try_bulk_load_cdt(
         vertices,
@@ -203,7 +272,7 @@ fn constrained_delaunay(points: &[Vec2], rim: usize) -> Result<Vec<[u32; 3]>, Pa
         .directed_edges()
         .filter(|e| {
             let (from, to) = (e.from().data().index as usize, e.to().data().index as usize);
-            e.is_constraint_edge() && to == (from + 1) % rim
+            e.is_constraint_edge() && next.get(from) == Some(&to)
         })
         .filter_map(|e| e.face().as_inner())
         .collect();
@@ -219,9 +288,9 @@ fn constrained_delaunay(points: &[Vec2], rim: usize) -> Result<Vec<[u32; 3]>, Pa
             .filter(|e| !e.is_constraint_edge());
         open.extend(across.filter_map(|e| e.rev().face().as_inner()));
     }
-    // The triangle count of a polygon with inner points follows from Euler's formula; any other count means that the
-    // fill leaked or missed a piece.
-    if faces.len() + 2 != rim + 2 * (points.len() - rim) {
+    // The triangle count of a polygon with islands and inner points follows from Euler's formula; any other count means
+    // that the fill leaked or missed a piece.
+    if faces.len() + 2 != rim + 2 * (points.len() - rim) + 2 * outline.islands {
         return Err(PatchError::RimCrosses);
     }
     // Start every triangle at its lowest corner and sort them, so that the order depends on the points alone.
@@ -251,7 +320,7 @@ mod tests {
         #[test]
         fn triangles_cover_any_star_polygon_once(radii in prop::collection::vec(0.5..2.0f64, 5..60), spacing in 0.05..0.6f64) {
             let polygon = star(&radii);
-            let triangulation = triangulate(&polygon, spacing, 5_000).unwrap();
+            let triangulation = triangulate(&Outline::from(&polygon[..]), spacing, 5_000).unwrap();
             let mut sum = 0.0;
             for face in &triangulation.faces {
                 let corners = face.map(|v| triangulation.points[v as usize]);
@@ -261,6 +330,32 @@ mod tests {
             }
             prop_assert!((sum - signed_area(&polygon)).abs() < 1e-9);
             prop_assert_eq!(&triangulation.points[..polygon.len()], &polygon[..]);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn islands_are_left_out(
+            radii in prop::collection::vec(1.0..2.0f64, 8..40), spacing in 0.05..0.6f64,
+            islands in prop::collection::vec(prop::collection::vec(0.1..0.3f64, 3..12), 1..3),
+        ) {
+            let mut corners = star(&radii);
+            let rim = corners.len();
+            for (radii, x) in islands.iter().zip([-0.4, 0.4]) {
+                corners.extend(star(radii).into_iter().rev().map(|p| p + Vec2::new(x, 0.0)));
+            }
+            let counts: Vec<usize> = islands.iter().map(Vec::len).collect();
+            let outline = Outline::new(corners.clone(), &counts);
+            let triangulation = triangulate(&outline, spacing, 5_000).unwrap();
+            let areas = (triangulation.faces.iter()).map(|f| signed_area(&f.map(|v| triangulation.points[v as usize])));
+            let islands: f64 = outline.area() - signed_area(&corners[..rim]);
+            prop_assert!(islands < 0.0);
+            prop_assert!((areas.sum::<f64>() - outline.area()).abs() < 1e-9);
+            let edges = triangulation.faces.iter().flat_map(|f| [(f[0], f[1]), (f[1], f[2]), (f[2], f[0])]);
+            let edges: std::collections::HashSet<(u32, u32)> = edges.collect();
+            for (from, to) in outline.next.iter().enumerate() {
+                prop_assert!(edges.contains(&(from as u32, *to as u32)));
+            }
         }
     }
 
@@ -276,7 +371,7 @@ mod tests {
         ];
         let eight: Vec<Vec2> = eight.iter().map(|p| Vec2::new(p.0, p.1)).collect();
         assert!(matches!(
-            triangulate(&eight, 0.1, 1000),
+            triangulate(&Outline::from(&eight[..]), 0.1, 1000),
             Err(PatchError::RimCrosses)
         ));
     }
@@ -284,7 +379,8 @@ mod tests {
     #[test]
     fn a_taken_chord_is_split_and_the_area_stays() {
         let polygon = star(&[1.0; 8]);
-        let mut triangulation = triangulate(&polygon, 10.0, 100).unwrap();
+        let outline = Outline::from(&polygon[..]);
+        let mut triangulation = triangulate(&outline, 10.0, 100).unwrap();
         let joined = |t: &Triangulation, a: u32, b: u32| {
             t.faces.iter().any(|f| f.contains(&a) && f.contains(&b))
         };
@@ -296,7 +392,7 @@ mod tests {
             .find(|(a, b)| joined(&triangulation, *a, *b))
             .unwrap();
         triangulation
-            .split_chords(8, Budget::unlimited(), |x, y| {
+            .split_chords(&outline, Budget::unlimited(), |x, y| {
                 (x.min(y), x.max(y)) == (a, b)
             })
             .unwrap();
@@ -312,7 +408,7 @@ mod tests {
 
     #[test]
     fn the_number_of_points_is_bounded() {
-        let triangulation = triangulate(&star(&[1.0; 30]), 1e-6, 500).unwrap();
+        let triangulation = triangulate(&Outline::from(&star(&[1.0; 30])[..]), 1e-6, 500).unwrap();
         assert!(triangulation.points.len() < 600);
     }
 }

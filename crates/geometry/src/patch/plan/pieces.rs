@@ -6,12 +6,14 @@
 //! edges that are the same edge on the scan.
 
 use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 
 use darn_budget::{Budget, Exhausted};
 
 use crate::mesh::{TriMesh, Vec2, Vec3};
-use crate::patch::triangulate::{self, Triangulation};
+use crate::patch::triangulate::{self, Outline, Triangulation};
 use crate::patch::{PatchError, untangle};
+use crate::polygon::inside;
 
 /// Nanoseconds of work a point in a triangulation.
 const POINT_WORK: u64 = 500;
@@ -49,16 +51,14 @@ impl RimPoints {
     fn split_taken_chords(
         &mut self,
         part: &mut Triangulation,
-        piece: &[usize],
+        (outline, piece): (&Outline, &[usize]),
         budget: &Budget,
     ) -> Result<(), Exhausted> {
         let ends = |a: u32, b: u32| {
             let [a, b] = [a, b].map(|corner| self.line[piece[corner as usize]]);
             edge(a, b)
         };
-        part.split_chords(piece.len(), budget, |a, b| {
-            self.joined.contains(&ends(a, b))
-        })?;
+        part.split_chords(outline, budget, |a, b| self.joined.contains(&ends(a, b)))?;
         let between = |(a, b): &(u32, u32)| (*a.max(b) as usize) < piece.len();
         let own: Vec<(u32, u32)> = (part.faces.iter())
             .flat_map(sides)
@@ -105,12 +105,14 @@ pub(super) struct Asked<'a> {
     pub spacing: f64,
     /// Most inner points, about.
     pub max_points: usize,
+    /// How many of the last rim vertices lie around each island in the hole, clockwise.
+    pub islands: Vec<usize>,
     /// What it may cost.
     pub budget: &'a Budget<'a>,
 }
 
-/// Triangulates the hole of a rim whose vertices lie at `rim` in the plane, counter-clockwise; they become the first
-/// points.
+/// Triangulates the hole of a rim whose vertices lie at `rim` in the plane, counter-clockwise, then those around islands;
+/// they become the first points.
 ///
 /// Pieces share no vertices: at a common point each has its own.
 ///
@@ -124,31 +126,74 @@ pub(super) fn triangulate_pieces(
     let Asked {
         spacing,
         max_points,
+        ref islands,
         budget,
     } = *asked;
     let mut whole = Triangulation {
         points: with_common_points(rim, &rim_points.line),
         faces: Vec::new(),
     };
-    let pieces = simple_pieces(&rim_points.line);
-    let polygon = |piece: &Vec<usize>| -> Result<Vec<Vec2>, PatchError> {
-        let corners: Vec<Vec2> = piece.iter().map(|k| whole.points[*k]).collect();
-        untangle::untangle(&corners, budget)?.ok_or(PatchError::RimCrosses)
+    let own = whole.points.len() - islands.iter().sum::<usize>();
+    let piece = |corners: Vec<usize>| -> Result<Piece, PatchError> {
+        let polygon: Vec<Vec2> = corners.iter().map(|k| whole.points[*k]).collect();
+        Ok(Piece {
+            polygon: untangle::untangle(&polygon, budget)?.ok_or(PatchError::RimCrosses)?,
+            corners,
+            islands: Vec::new(),
+        })
     };
-    let polygons: Vec<Vec<Vec2>> = (pieces.iter().map(polygon)).collect::<Result<_, _>>()?;
-    if polygons.is_empty() {
+    let pieces = simple_pieces(&rim_points.line[..own]).into_iter();
+    let mut pieces: Vec<Piece> = pieces.map(piece).collect::<Result<_, _>>()?;
+    if pieces.is_empty() {
         return Err(PatchError::RimCrosses);
     }
-    let area = |polygon: &Vec<Vec2>| triangulate::signed_area(polygon);
-    let whole_area: f64 = polygons.iter().map(area).sum();
-    for (piece, polygon) in pieces.iter().zip(&polygons) {
-        let max_points = (max_points as f64 * (area(polygon) / whole_area)) as usize;
-        budget.spend(POINT_WORK * (polygon.len() + max_points) as u64)?;
-        let mut part = triangulate::triangulate(polygon, spacing, max_points)?;
-        rim_points.split_taken_chords(&mut part, piece, budget)?;
-        append(&mut whole, &part, piece);
+    let mut first = own;
+    for count in islands {
+        let island = first..first + count;
+        first = island.end;
+        let at = whole.points[island.start];
+        let around = pieces.iter_mut().find(|p| inside(&p.polygon, at));
+        around.ok_or(PatchError::RimCrosses)?.islands.push(island);
+    }
+    let pieces: Vec<(Outline, Vec<usize>)> = (pieces.into_iter())
+        .map(|p| p.outline(&whole.points))
+        .collect();
+    let whole_area: f64 = pieces.iter().map(|(outline, _)| outline.area()).sum();
+    for (outline, corners) in &pieces {
+        let max_points = (max_points as f64 * (outline.area() / whole_area)) as usize;
+        budget.spend(POINT_WORK * (corners.len() + max_points) as u64)?;
+        let mut part = triangulate::triangulate(outline, spacing, max_points)?;
+        rim_points.split_taken_chords(&mut part, (outline, corners), budget)?;
+        append(&mut whole, &part, corners);
     }
     Ok(whole)
+}
+
+/// A piece of a hole.
+struct Piece {
+    /// Its polygon, without crossings.
+    polygon: Vec<Vec2>,
+    /// Per corner of the polygon its rim vertex.
+    corners: Vec<usize>,
+    /// The islands in it, as stretches of rim vertices.
+    islands: Vec<Range<usize>>,
+}
+
+impl Piece {
+    /// Its outline with its islands, and the rim vertices of the outline's corners.
+    fn outline(self, points: &[Vec2]) -> (Outline, Vec<usize>) {
+        let Piece {
+            mut polygon,
+            mut corners,
+            islands,
+        } = self;
+        let counts: Vec<usize> = islands.iter().map(Range::len).collect();
+        for island in islands {
+            polygon.extend_from_slice(&points[island.clone()]);
+            corners.extend(island);
+        }
+        (Outline::new(polygon, &counts), corners)
+    }
 }
 
 /// The rim in the plane with all vertices of one point at their mean: the chart may have laid them apart.

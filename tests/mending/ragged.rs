@@ -1,0 +1,137 @@
+//! Rims as scanners leave them: spikes, flaps and lips that overlap stay in the file, and the new cloth starts at the
+//! sound edge beneath them.
+
+use darn_contract::Constraints;
+use darn_contract::v1;
+use darn_geometry::mesh::loops::LoopKind;
+use darn_geometry::mesh::shapes::{fray, overlapping_slit, sheet, tongue};
+use darn_geometry::mesh::{TriMesh, Vec3};
+
+use super::cloth::{MendedScan, mended, packed, read};
+
+/// Mends a scan with one hole: the hole's report, and the mended scan.
+fn mend(mesh: &TriMesh) -> (v1::HoleReport, MendedScan) {
+    let bytes = packed(mesh, &[]);
+    let mended = mended(&bytes, &Constraints::default()).expect("a hole that can be filled");
+    let after = MendedScan::of(&mended.bytes);
+    // Every triangle of the scan is there, as it was.
+    let before = read(&bytes).surface;
+    let scan = &after.scan.surface;
+    for (f, face) in before.faces.iter().enumerate() {
+        assert_eq!(before.triangle(f), scan.triangle(f), "{face:?}");
+    }
+    let [hole] = &mended.report.holes[..] else {
+        panic!("{} holes", mended.report.holes.len());
+    };
+    (hole.clone(), after)
+}
+
+fn check(report: &v1::HoleReport) {
+    let patch = report.patch.as_ref().expect("a patch");
+    assert!(
+        patch.stretch_max < 2.0,
+        "stretched {} times",
+        patch.stretch_max
+    );
+    assert_eq!(patch.self_intersections, 0);
+    assert_eq!(patch.seam_gap, 0.0);
+    let said = report
+        .notes
+        .iter()
+        .any(|n| n.contains("no part of the cloth"));
+    assert_eq!(said, report.left_faces > 0, "{:?}", report.notes);
+}
+
+#[test]
+fn a_frayed_rim_is_patched_from_its_sound_edge() {
+    let n = 36;
+    let keep = |u: f64, v: f64| (u - 0.5).hypot(v - 0.5) > 0.18;
+    let waves = |u: f64, v: f64| Vec3::new(u, v, 0.03 * (7.0 * u + 2.0 * v).sin());
+    let clean = sheet(n, keep, waves);
+    for (length, seed) in [(3.0, 1), (5.0, 2), (8.0, 3)] {
+        let middle = |p: &Vec3| (p.x - 0.5).hypot(p.y - 0.5) < 0.4;
+        let frayed = fray(&clean, middle, length / n as f64, seed);
+        let (report, _) = mend(&frayed);
+        check(&report);
+        assert_eq!(
+            report.left_faces as usize,
+            frayed.faces.len() - clean.faces.len()
+        );
+    }
+}
+
+#[test]
+fn a_clean_rim_has_nothing_left_out() {
+    let keep = |u: f64, v: f64| (u - 0.5).hypot(v - 0.5) > 0.18;
+    let (report, _) = mend(&sheet(36, keep, |u, v| {
+        Vec3::new(u, v, 0.05 * (7.0 * u).sin())
+    }));
+    check(&report);
+    assert_eq!(report.left_faces, 0);
+}
+
+#[test]
+fn cloth_is_laid_under_a_tongue() {
+    for angle in [1.2, 1.6, 2.4, -1.6] {
+        let (report, after) = mend(&tongue(33, angle));
+        check(&report);
+        assert!(report.left_faces > 200, "{} faces", report.left_faces);
+        let highest = after
+            .new_positions()
+            .iter()
+            .map(|p| p.z.abs())
+            .fold(0.0, f64::max);
+        assert!(
+            highest < 0.03,
+            "a tent of height {highest} over a tongue at {angle}"
+        );
+    }
+}
+
+#[test]
+fn lips_that_overlap_are_joined() {
+    for edges in [0.6, 1.5] {
+        let (report, _) = mend(&overlapping_slit(40, edges / 40.0));
+        check(&report);
+        assert!(report.left_faces > 0);
+    }
+}
+
+/// A sheet with a square hole and a strip of cloth in it, on a ridge that runs through both.
+fn ridge(lift: f64) -> TriMesh {
+    let within = |x: f64, half: f64| (x - 0.5).abs() < half;
+    let strip = move |u: f64, v: f64| within(u, 0.065) && within(v, 0.16);
+    let keep = |u: f64, v: f64| strip(u, v) || !(within(u, 0.2) && within(v, 0.24));
+    sheet(40, keep, |u, v| {
+        let ridge = 0.05 * (-((u - 0.5) / 0.1).powi(2)).exp();
+        Vec3::new(u, v, ridge + if strip(u, v) { lift } else { 0.0 })
+    })
+}
+
+#[test]
+fn a_patch_meets_an_island_of_its_cloth() {
+    let (report, after) = mend(&ridge(0.0));
+    check(&report);
+    let kinds: Vec<LoopKind> = after.loops.iter().map(|l| l.kind).collect();
+    assert_eq!(kinds, [LoopKind::Outer], "{:?}", report.notes);
+    assert_eq!(after.topology.components, 1);
+    assert!(after.topology.non_manifold.is_empty());
+    assert!(
+        report
+            .notes
+            .iter()
+            .any(|n| n.contains("the new cloth meets them"))
+    );
+}
+
+#[test]
+fn a_scrap_above_a_hole_is_left() {
+    for lift in [0.15, -0.3] {
+        let (report, after) = mend(&ridge(lift));
+        check(&report);
+        let mut kinds: Vec<LoopKind> = after.loops.iter().map(|l| l.kind).collect();
+        kinds.dedup();
+        assert_eq!(kinds, [LoopKind::Outer]);
+        assert_eq!(after.topology.components, 2);
+    }
+}
