@@ -190,8 +190,8 @@ fn rim_notes(hole: &Hole) -> Vec<String> {
     let mut notes = Vec::new();
     if hole.left_faces > 0 {
         notes.push(format!(
-            "{} triangle(s) at the rim are no part of the cloth's edge (spikes, threads or flaps); they were kept, and the \
-             new cloth starts at the sound edge beneath them",
+            "{} triangle(s) at the rim are no part of the cloth's edge (spikes, threads, flaps or a lip that lies over the other \
+             one); they were kept. The new cloth starts at the sound edge beneath them, and may pass through them",
             hole.left_faces
         ));
     }

@@ -9,28 +9,25 @@ use super::{TriMesh, Vec3};
 /// The faces of the whole mesh outside `region` whose bounding boxes come within `margin` (scene units) of the rim's,
 /// as a mesh.
 ///
-/// A face with a vertex on the rim is left out: it touches the patch there and does not cut it. But the faces `at_rim`
-/// (ascending) hang on the rim like the patch, and are layers wherever they are.
-pub fn layers_near(whole: &TriMesh, region: &Region, margin: f64, at_rim: &[FaceId]) -> TriMesh {
+/// A face with a vertex on the rim is left out: it touches the patch there and does not cut it. So are the faces `left`
+/// (ascending): they are no cloth, and may lie where the cloth was.
+pub fn layers_near(whole: &TriMesh, region: &Region, margin: f64, left: &[FaceId]) -> TriMesh {
     let rim = || (region.rim.iter()).map(|v| region.mesh.positions[*v as usize]);
     let low = rim().fold(Vec3::repeat(f64::MAX), |m, p| m.inf(&p)) - Vec3::repeat(margin);
     let high = rim().fold(Vec3::repeat(f64::MIN), |m, p| m.sup(&p)) + Vec3::repeat(margin);
     let mut own = vec![false; whole.faces.len()];
-    region.faces.iter().for_each(|f| own[f.index()] = true);
+    (region.faces.iter().chain(left)).for_each(|f| own[f.index()] = true);
     let on_rim: HashSet<VertexId> = (region.rim.iter())
         .map(|v| region.vertices[*v as usize])
         .collect();
-    let near = |(k, (face, own)): &(usize, (&[u32; 3], bool))| {
-        if at_rim.binary_search(&FaceId(*k as u32)).is_ok() {
-            return true;
-        }
+    let near = |(face, own): &(&[u32; 3], bool)| {
         let [a, b, c] = face.map(|v| whole.positions[v as usize]);
         let (least, most) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));
         let apart = (0..3).any(|k| most[k] < low[k] || least[k] > high[k]);
         !own && !apart && !face.iter().any(|v| on_rim.contains(&VertexId(*v)))
     };
-    let faces = whole.faces.iter().zip(own).enumerate().filter(near);
-    whole.part(faces.map(|(_, (face, _))| *face))
+    let faces = whole.faces.iter().zip(own).filter(near);
+    whole.part(faces.map(|(face, _)| *face))
 }
 
 #[cfg(test)]

@@ -12,13 +12,13 @@ use crate::mesh::index::FaceId;
 use crate::mesh::region::Region;
 
 /// Edges by which the faces left out reach beyond the overlap.
-const WIDER: usize = 2;
+const WIDER: usize = 1;
 /// Nanoseconds of work a face or a pair of faces.
 const PAIR_WORK: u64 = 300;
 
-/// The faces of one lip that the other covers on the chart, and those within two edges of them, ascending: of each two,
-/// the lip with the fewer such faces. Without them the rim does not cross itself, and a patch has room to pass the lip
-/// above or below. Empty where nothing at the rim overlaps.
+/// The faces of one lip that the other covers on the chart, and those beside them, ascending: of each two, the lip with
+/// the fewer such faces. Without them the rim does not cross itself, nor come so close to itself that a patch would have
+/// to be thin. Empty where nothing at the rim overlaps.
 ///
 /// # Errors
 /// `Exhausted`.

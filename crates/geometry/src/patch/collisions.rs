@@ -35,7 +35,7 @@ struct RestEdge {
 }
 
 /// Most rounds of pushes.
-const ROUNDS: usize = 300;
+const ROUNDS: usize = 100;
 /// Most pairs that all rounds together push apart, for each face of the patch. Patches that came apart needed 0.05, tangles that lost some
 /// of their pairs 12.
 const PAIRS_PER_FACE: usize = 20;
