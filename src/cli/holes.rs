@@ -3,7 +3,8 @@
 use super::failure::{Failure, OrFail};
 use super::files;
 use darn_budget::Budget;
-use darn_contract::v1::{HolesReport, Loop, LoopKind, SetAside};
+use darn_contract::port::HolesQuery;
+use darn_contract::v1::{BorderCandidate, HolesReport, Loop, LoopKind, SetAside, Suspect};
 use darn_gltf_scan::{Scan, ScanLimits};
 use std::path::PathBuf;
 
@@ -14,6 +15,9 @@ pub struct HolesArgs {
     /// Print the report that POST /holes answers with
     #[arg(long)]
     json: bool,
+    /// List what a mesher has probably sealed, too, each with a cut that takes it out
+    #[arg(long)]
+    suspects: bool,
 }
 
 /// Runs `darn holes`.
@@ -21,7 +25,11 @@ pub fn run(args: &HolesArgs) -> Result<(), Failure> {
     let bytes = files::read(&args.scan)?;
     let name = args.scan.display();
     let scan = Scan::read(bytes, &ScanLimits::default()).or_fail(format!("read {name}"))?;
-    let report = darn_mend::find_holes(&scan, Budget::unlimited()).or_fail("find the holes")?;
+    let wanted = HolesQuery {
+        suspects: args.suspects,
+    };
+    let report =
+        darn_mend::find_holes(&scan, wanted, Budget::unlimited()).or_fail("find the holes")?;
     if args.json {
         println!(
             "{}",
@@ -42,6 +50,12 @@ fn table(report: &HolesReport) -> String {
         text.push_str(&line(rim));
     }
     text.push_str(&set_aside(&report.set_aside));
+    for bite in &report.candidates {
+        text.push_str(&candidate_line(bite));
+    }
+    for suspect in &report.suspects {
+        text.push_str(&suspect_line(suspect));
+    }
     for note in &report.notes {
         text.push_str(&format!("note: {note}\n"));
     }
@@ -68,6 +82,22 @@ fn line(rim: &Loop) -> String {
         rim.length,
         rim.turning,
         centroid.join(" ")
+    )
+}
+
+fn candidate_line(bite: &BorderCandidate) -> String {
+    let border = serde_json::to_string(&bite.border).unwrap_or_default();
+    format!(
+        "bite or rip at loop {}, {:.4} wide and {:.4} deep\n      border: {border}\n",
+        bite.r#loop, bite.mouth, bite.depth
+    )
+}
+
+fn suspect_line(suspect: &Suspect) -> String {
+    let cut = serde_json::to_string(&suspect.cut).unwrap_or_default();
+    format!(
+        "{} patch of {} faces, area {:.4}: {}\n      cut: {cut}\n",
+        suspect.reason, suspect.faces, suspect.area, suspect.detail
     )
 }
 

@@ -11,7 +11,7 @@ use std::{
 
 use axum::body::Bytes;
 use darn_budget::Budget;
-use darn_contract::port::{EditSession, Mended, Mender, PatchForm, Patches, Refusal};
+use darn_contract::port::{EditSession, HolesQuery, Mended, Mender, PatchForm, Patches, Refusal};
 use darn_contract::{Anchor, Code, Constraints, FieldError, Search, codes, v1};
 use serde_json::{Value, json};
 
@@ -433,8 +433,17 @@ impl Mender for FakeMender {
         Ok(Box::new(FakeSession::new(self, scan)))
     }
 
-    fn find_holes(&self, scan: Bytes, _: &Budget<'_>) -> Result<v1::HolesReport, Refusal> {
+    fn find_holes(
+        &self,
+        scan: Bytes,
+        wanted: HolesQuery,
+        _: &Budget<'_>,
+    ) -> Result<v1::HolesReport, Refusal> {
         self.act_on_scan(&scan)?;
+        let suspect = v1::Suspect {
+            reason: "stretched".to_owned(),
+            ..Default::default()
+        };
         let hole = v1::Loop {
             id: 2,
             kind: v1::LoopKind::Hole.into(),
@@ -442,6 +451,7 @@ impl Mender for FakeMender {
         };
         Ok(v1::HolesReport {
             loops: vec![hole],
+            suspects: wanted.suspects.then_some(suspect).into_iter().collect(),
             components: 1,
             ..Default::default()
         })

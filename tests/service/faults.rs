@@ -69,6 +69,12 @@ async fn refusals_are_problem_documents() {
             asked(r#"{"anchors": [{"uv": [0.5, 2], "position": [0, 0]}], "weights": "other"}"#),
         ),
         (
+            "constraints_invalid_cuts",
+            asked(
+                r#"{"holes": [{"cut": {"center": [0, 0, 0], "radius": 0}}, {"cut": {"polygon": [[0, 0, 0]], "depth": 1}}, {"cut": {}}]}"#,
+            ),
+        ),
+        (
             "holes_with_constraints",
             service.post("/holes").multipart(form("{}")),
         ),

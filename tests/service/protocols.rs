@@ -1,6 +1,8 @@
 //! Successful answers over HTTP and gRPC, and the errors of gRPC.
 
-use darn_contract::v1::{Anchor, Constraints, ScanChunk, inpaint_chunk::Part as ChunkPart};
+use darn_contract::v1::{
+    Anchor, Constraints, HolesQuery, ScanChunk, inpaint_chunk::Part as ChunkPart,
+};
 use darn_serve::generated::darn_client::DarnClient;
 use reqwest::multipart::{Form, Part};
 use serde_json::Value;
@@ -20,11 +22,13 @@ fn chunks(
         ScanChunk {
             constraints,
             query: None,
+            holes: None,
             data: head.to_vec().into(),
         },
         ScanChunk {
             constraints: None,
             query: None,
+            holes: None,
             data: tail.to_vec().into(),
         },
     ])
@@ -88,6 +92,30 @@ async fn holes_are_described() {
         .body("{}");
     let report: Value = request.send().await.unwrap().json().await.unwrap();
     assert_eq!(report["loops"][0]["kind"], "HOLE");
+    assert_eq!(report.get("suspects"), None);
+    for (query, listed) in [
+        ("suspects=true", true),
+        ("suspects", true),
+        ("suspects=false", false),
+    ] {
+        let request = service
+            .post(&format!("/holes?{query}"))
+            .header("content-type", "model/gltf+json")
+            .body("{}");
+        let report: Value = request.send().await.unwrap().json().await.unwrap();
+        assert_eq!(
+            report["suspects"][0]["reason"] == "stretched",
+            listed,
+            "{query}"
+        );
+    }
+    let request = service
+        .post("/holes?suspect=1")
+        .header("content-type", "model/gltf+json")
+        .body("{}");
+    let refused = request.send().await.unwrap();
+    assert_eq!(refused.status(), 400);
+    assert!(refused.text().await.unwrap().contains("suspects=true"));
 }
 
 #[tokio::test]
@@ -100,7 +128,20 @@ async fn grpc_shares_the_port() {
         .await
         .unwrap()
         .into_inner();
-    assert_eq!(holes.loops[0].id, 2);
+    assert_eq!((holes.loops[0].id, holes.suspects.len()), (2, 0));
+    let asked = ScanChunk {
+        holes: Some(HolesQuery { suspects: true }),
+        data: FakeScan::named("cloth").bytes().into(),
+        ..Default::default()
+    };
+    let holes = client
+        .find_holes(tokio_stream::iter(vec![asked.clone()]))
+        .await;
+    assert_eq!(holes.unwrap().into_inner().suspects.len(), 1);
+    let Err(refused) = client.inpaint(tokio_stream::iter(vec![asked])).await else {
+        panic!("a query of another method");
+    };
+    assert_eq!(refused.code(), Code::InvalidArgument);
 
     let anchor = Anchor {
         uv: vec![0.5, 0.5],

@@ -5,6 +5,7 @@
 //! the value, hands out plain numbers and records the path to an error.
 
 use std::fmt;
+use std::sync::LazyLock;
 
 use darn_json::excerpt;
 use serde::de::{
@@ -12,7 +13,7 @@ use serde::de::{
     MapAccess, SeqAccess, Unexpected, Visitor,
     value::{Error as SerdeError, StrDeserializer},
 };
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 use super::FieldError;
 
@@ -133,6 +134,9 @@ struct ValueReader<'v> {
     null: NullReading,
 }
 
+/// What `"border": "auto"` stands for.
+static AUTO: LazyLock<Value> = LazyLock::new(|| json!({ "auto": true }));
+
 /// How null is read: in proto3 JSON a field that is null counts as absent; anywhere else null is a value.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum NullReading {
@@ -224,6 +228,23 @@ impl<'de> Deserializer<'de> for ValueReader<'_> {
         self.deserialize_any(visitor)
     }
 
+    fn deserialize_struct<V: Visitor<'de>>(
+        self,
+        name: &'static str,
+        _fields: &'static [&'static str],
+        visitor: V,
+    ) -> Result<V::Value, PathError> {
+        match (name, self.value, &*AUTO) {
+            ("darn.v1.Border", Value::String(text), Value::Object(auto)) if text == "auto" => {
+                visitor.visit_map(ObjectReader {
+                    rest: auto.iter(),
+                    pending: None,
+                })
+            }
+            _ => self.deserialize_any(visitor),
+        }
+    }
+
     fn deserialize_newtype_struct<V: Visitor<'de>>(
         self,
         _name: &'static str,
@@ -234,7 +255,7 @@ impl<'de> Deserializer<'de> for ValueReader<'_> {
 
     serde::forward_to_deserialize_any! {
         i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct
-        tuple tuple_struct map struct enum identifier ignored_any
+        tuple tuple_struct map enum identifier ignored_any
     }
 }
 

@@ -16,7 +16,8 @@ pub use error_chain::error_chain;
 pub use json::{JsonError, from_json};
 pub use outcome::Outcome;
 pub use validate::{
-    Anchor, Constraints, Diameters, Edit, FieldError, Fill, Gesture, HoleSelector, Search,
+    Anchor, Border, Constraints, Cut, Diameters, Edit, FieldError, Fill, Gesture, HoleSelector,
+    Search,
 };
 
 /// The messages of `proto/darn/v1/darn.proto`, as generated.

@@ -7,6 +7,13 @@ use darn_budget::Budget;
 
 use crate::{Code, Constraints, FieldError, Search, codes, v1};
 
+/// What is wanted beside a scan's boundary loops.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct HolesQuery {
+    /// What a mesher has probably sealed.
+    pub suspects: bool,
+}
+
 /// A mended scan and its report.
 #[derive(Debug, Clone)]
 pub struct Mended {
@@ -66,11 +73,16 @@ pub trait Mender: Send + Sync + 'static {
         budget: &Budget<'_>,
     ) -> Result<Box<dyn EditSession>, Refusal>;
 
-    /// Every boundary loop of a scan.
+    /// Every boundary loop of a scan, and what else is wanted.
     ///
     /// # Errors
     /// The scan is not readable.
-    fn find_holes(&self, scan: Bytes, budget: &Budget<'_>) -> Result<v1::HolesReport, Refusal>;
+    fn find_holes(
+        &self,
+        scan: Bytes,
+        wanted: HolesQuery,
+        budget: &Budget<'_>,
+    ) -> Result<v1::HolesReport, Refusal>;
 
     /// Mends one small scan completely. The service is ready once it has succeeded.
     ///

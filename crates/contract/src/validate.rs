@@ -6,11 +6,14 @@ use darn_json::{EXCERPT_BYTES, excerpt};
 
 use super::v1;
 
+mod selector;
+
+pub use selector::{Border, Cut, HoleSelector};
+
 /// Most entries of one list of constraints: far above any use, and cheap to check.
 const MAX_ENTRIES: usize = 4096;
 /// Largest absolute coordinate, in the scene's unit: its square still fits an f32, the type of a glTF's positions.
 const MAX_COORDINATE: f64 = 1e18;
-const NOT_SERVED: &str = "not served by this version yet";
 
 /// One field of a request and what is wrong with it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -73,15 +76,6 @@ pub struct Diameters {
     pub min: Option<f64>,
     /// The largest.
     pub max: Option<f64>,
-}
-
-/// Selects one hole.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum HoleSelector {
-    /// The hole of this boundary loop id.
-    Id(u32),
-    /// The hole whose rim is nearest to this point in scene space.
-    Near([f64; 3]),
 }
 
 /// A point the new cloth should pass through.
@@ -288,23 +282,6 @@ impl FieldErrors {
             |x| (0.0..=MAX_COORDINATE).contains(&x),
             expected,
         )
-    }
-
-    fn hole(&mut self, at: &str, hole: &v1::HoleSelector) -> Option<HoleSelector> {
-        match (hole.id, hole.near.as_slice(), &hole.cut) {
-            (Some(id), [], None) => Some(HoleSelector::Id(id)),
-            (None, near, None) if !near.is_empty() => self
-                .point(&format!("{at}/near"), near)
-                .map(HoleSelector::Near),
-            (None, [], Some(_)) => {
-                self.push(&format!("{at}/cut"), NOT_SERVED);
-                None
-            }
-            _ => {
-                self.push(at, "exactly one of `id`, `near` and `cut` says which hole");
-                None
-            }
-        }
     }
 
     fn anchor(&mut self, at: &str, anchor: &v1::Anchor) -> Option<Anchor> {

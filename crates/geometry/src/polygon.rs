@@ -11,6 +11,14 @@ pub fn inside(polygon: &[Vec2], p: Vec2) -> bool {
     crossed.count() % 2 == 1
 }
 
+/// Whether two segments have a point in common. Segments on one line are not looked at.
+pub fn crosses(a: &[Vec2; 2], b: &[Vec2; 2]) -> bool {
+    let side = |[p, q]: &[Vec2; 2], x: &Vec2| (q - p).perp(&(x - p));
+    let opposite = |line, ends: &[Vec2; 2]| side(line, &ends[0]) * side(line, &ends[1]) <= 0.0;
+    let parallel = (a[1] - a[0]).perp(&(b[1] - b[0])) == 0.0;
+    !parallel && opposite(a, b) && opposite(b, a)
+}
+
 /// Larger side of a polygon's box; `-∞` for a polygon without corners.
 pub fn extent(polygon: &[Vec2]) -> f64 {
     let low = polygon.iter().fold(Vec2::repeat(f64::MAX), |m, p| m.inf(p));

@@ -20,6 +20,8 @@ pub(super) struct Appender<'s> {
     lists: BTreeMap<&'static str, Vec<Value>>,
     /// New primitives by mesh.
     primitives: BTreeMap<usize, Vec<Value>>,
+    /// Members to set in what is there: their paths and values.
+    members: Vec<(Vec<String>, Value)>,
     /// The buffer that takes the new bytes.
     buffer: usize,
     /// How many bytes that buffer has before them.
@@ -87,6 +89,7 @@ impl<'s> Appender<'s> {
             scan,
             lists: BTreeMap::new(),
             primitives: BTreeMap::new(),
+            members: Vec::new(),
             buffer,
             start,
             in_bin,
@@ -110,6 +113,19 @@ impl<'s> Appender<'s> {
     /// Appends a primitive to a mesh.
     pub fn primitive(&mut self, mesh: usize, primitive: Value) {
         self.primitives.entry(mesh).or_default().push(primitive);
+    }
+
+    /// Sets a member of an object that is there.
+    pub fn set(&mut self, path: Vec<String>, value: Value) {
+        self.members.push((path, value));
+    }
+
+    /// Sets the extras of the element that was appended last to a list.
+    pub fn extras_of_last(&mut self, key: &str, extras: Value) {
+        let last = self.lists.get_mut(key).and_then(|list| list.last_mut());
+        if let Some(object) = last.and_then(Value::as_object_mut) {
+            object.insert("extras".into(), extras);
+        }
     }
 
     /// Appends an accessor with a buffer view of its own; returns the accessor's index.
@@ -166,6 +182,10 @@ impl<'s> Appender<'s> {
             // The BIN chunk already has a buffer: its length grows.
             self.lists.remove("buffers");
             edit.replace(&["buffers", "0", "byteLength"], &json!(length))?;
+        }
+        for (path, value) in &self.members {
+            let path: Vec<&str> = path.iter().map(String::as_str).collect();
+            edit.set(&path, value)?;
         }
         for (mesh, primitives) in &self.primitives {
             edit.append(&["meshes", &mesh.to_string(), "primitives"], primitives)?;

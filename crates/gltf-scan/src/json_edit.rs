@@ -59,6 +59,27 @@ impl<'t> JsonEdit<'t> {
         Ok(())
     }
 
+    /// Replaces the value at `path`, or adds it to the object that it would be a member of, which must be there.
+    pub fn set(&mut self, path: &[&str], value: &Value) -> Result<(), ScanError> {
+        let Some((key, parent)) = path.split_last() else {
+            return Err(invalid(path, "is the whole text"));
+        };
+        if self.find(path)?.is_some() {
+            return self.replace(path, value);
+        }
+        let object = self
+            .find(parent)?
+            .ok_or_else(|| invalid(parent, "is missing"))?;
+        let close = self.span(object).end.saturating_sub(1);
+        // One of several new members comes after those before it.
+        let is_first = matches!(object.trim_start().strip_prefix('{'), Some(rest) if rest.trim_start().starts_with('}'))
+            && !self.edits.iter().any(|(range, _)| *range == (close..close));
+        let comma = if is_first { "" } else { "," };
+        let member = format!("{comma}{}:{value}", Value::from(*key));
+        self.edits.push((close..close, member));
+        Ok(())
+    }
+
     /// Appends to the array at `path`; a missing array is created if it is a member of the root.
     pub fn append(&mut self, path: &[&str], values: &[Value]) -> Result<(), ScanError> {
         let new = values
@@ -165,6 +186,21 @@ mod tests {
         assert_eq!(
             edit.finish(),
             " { \"a\" : [ 1E5 , 2 ,3,{\"x\":4}] ,\n\"b\":{\"c\": [5],\"n\":1.0} , \"\\u0062\\u0062\":[{\"n\" :8}] ,\"new\":[6]} "
+        );
+    }
+
+    #[test]
+    fn members_are_set_where_they_are_or_at_the_end_of_their_object() {
+        let text = "{ \"a\" : { } , \"b\":{\"n\":1.0 }}";
+        let mut edit = JsonEdit::new(text.as_bytes()).unwrap();
+        edit.set(&["a", "x"], &json!(1)).unwrap();
+        edit.set(&["a", "y\""], &json!([2])).unwrap();
+        edit.set(&["b", "n"], &json!(3)).unwrap();
+        edit.set(&["b", "m"], &json!({})).unwrap();
+        assert!(edit.set(&["c", "m"], &json!({})).is_err());
+        assert_eq!(
+            edit.finish(),
+            "{ \"a\" : { \"x\":1,\"y\\\"\":[2]} , \"b\":{\"n\":3 ,\"m\":{}}}"
         );
     }
 

@@ -14,6 +14,7 @@ mod append;
 mod attributes;
 mod buffers;
 mod container;
+mod cut;
 mod error;
 pub mod export;
 mod json;

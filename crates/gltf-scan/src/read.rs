@@ -108,6 +108,7 @@ fn read(bytes: Bytes, limits: &ScanLimits, budget: &Budget) -> Result<Scan, Scan
         bytes,
         layout,
         json,
+        cut: BTreeSet::new(),
         json_held,
     };
     budget.hold(scan.decoded_bytes())?;

@@ -29,6 +29,8 @@ pub struct Scan {
     pub(crate) bytes: Bytes,
     pub(crate) layout: ContainerLayout,
     pub(crate) json: Value,
+    /// The primitives, by mesh and index, of which triangles were cut out; see [`Scan::without_faces`].
+    pub(crate) cut: BTreeSet<(usize, usize)>,
     /// Bytes of memory that the parsed JSON takes.
     pub(crate) json_held: usize,
 }

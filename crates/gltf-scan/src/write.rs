@@ -10,6 +10,7 @@ use serde_json::{Map, Value, json};
 use super::append::{AccessorBounds, AccessorData, Appender};
 use super::buffers::BufferTarget;
 use super::container::float_bytes;
+use super::cut::{cut_primitives, index_bytes};
 use super::error::ScanError;
 use super::patch_primitive::{PatchPoint, PatchPrimitive};
 use super::patch_skin::patch_influences;
@@ -23,9 +24,11 @@ const UNIT: f32 = 1e-3;
 const RECONSTRUCTION: &str = "darn reconstruction";
 
 impl Scan {
-    /// The scan with patches appended, in the container it was read from. Without patches: the bytes that were read.
+    /// The scan with patches appended, in the container it was read from. Without patches and cuts: the bytes that were
+    /// read.
     ///
-    /// Everything that was there keeps its value, spelling and index; the BIN chunk keeps its bytes as a prefix.
+    /// Everything that was there keeps its value, spelling and index; the BIN chunk keeps its bytes as a prefix. Only
+    /// primitives of which triangles were cut out get new indices.
     ///
     /// # Errors
     /// [`ScanError::InvalidPatch`] for a patch that contradicts itself or the scan, [`ScanError::Singular`] for one on
@@ -43,10 +46,11 @@ impl Scan {
         patches: &[PatchPrimitive],
         budget: &Budget,
     ) -> Result<Vec<u8>, ScanError> {
-        if patches.is_empty() {
+        if patches.is_empty() && self.cut.is_empty() {
             return Ok(self.bytes.to_vec());
         }
         let mut out = Appender::new(self);
+        cut_primitives(self, &mut out)?;
         let mut materials = HashMap::new();
         for (index, patch) in patches.iter().enumerate() {
             let checked = CheckedPatch::new(self, patch, index)?;
@@ -335,21 +339,7 @@ impl<'s> CheckedPatch<'s> {
             .faces
             .iter()
             .map(|&[a, b, c]| if reversed { [a, c, b] } else { [a, b, c] });
-        // In u16, 65535 is not an index: it restarts a primitive.
-        let (component, bytes) = if self.points.len() <= usize::from(u16::MAX) {
-            (
-                ComponentType::U16,
-                faces
-                    .flatten()
-                    .flat_map(|index| (index as u16).to_le_bytes())
-                    .collect(),
-            )
-        } else {
-            (
-                ComponentType::U32,
-                faces.flatten().flat_map(u32::to_le_bytes).collect(),
-            )
-        };
+        let (component, bytes) = index_bytes(faces, self.points.len());
         out.accessor(AccessorData {
             name: &self.patch.name,
             target: BufferTarget::Indices,

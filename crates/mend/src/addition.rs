@@ -18,6 +18,9 @@ use darn_geometry::patch::{Patch, quality};
 use darn_gltf_scan::{PatchPoint, PatchPrimitive, Scan, ScanPart};
 use darn_net::WeightsCard;
 
+/// Stands for a vertex of a region that the scan does not have: the new hem's.
+const NO_VERTEX: u32 = u32::MAX;
+
 /// Where patches get their attributes and their provenance from.
 pub struct PatchSource<'a> {
     /// The scan.
@@ -67,7 +70,7 @@ impl PatchSource<'_> {
             .iter()
             .map(|s| s.filter(looks_alike).map(|s| s.corners))
             .collect();
-        let mut any = vec![u32::MAX; region.mesh.positions.len()];
+        let mut any = vec![NO_VERTEX; region.mesh.positions.len()];
         let mut owners: Vec<(u32, usize)> = Vec::new();
         for (face, source) in region.mesh.faces.iter().zip(&sources) {
             let Some(source) = source else {
@@ -79,7 +82,7 @@ impl PatchSource<'_> {
             for (v, s) in face.iter().zip(&source.corners) {
                 // A vertex of the patch's own node is preferred: its stored bits are copied.
                 let own = scan.parts[source.part].node == look.node;
-                if own || any[*v as usize] == u32::MAX {
+                if own || any[*v as usize] == NO_VERTEX {
                     any[*v as usize] = *s;
                 }
             }
@@ -113,8 +116,8 @@ impl PatchSource<'_> {
         }
         budget.hold(patch_bytes(dressed.corners.len(), width))?;
         let points = dressed.corners.iter().map(|c| match c.scan {
-            Some(s) => PatchPoint::Scan(s),
-            None => PatchPoint::New(patch.positions[c.vertex as usize]),
+            Some(s) if s != NO_VERTEX => PatchPoint::Scan(s),
+            _ => PatchPoint::New(patch.positions[c.vertex as usize]),
         });
         let column = |c: usize| {
             dressed

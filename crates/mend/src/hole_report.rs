@@ -83,6 +83,7 @@ impl<'a> PatchDraft<'a> {
             edits: kept.edits,
             doubts: doubts(&patch, &quality),
             left_faces: hole.charted().map_or(0, |hole| hole.left_faces) as u32,
+            cut: welded.cuts.report(hole.id()),
         };
         Ok(FilledHole {
             hole,
@@ -141,7 +142,10 @@ fn loose_pieces_note(
     let rim = &welded.loops[hole.id() as usize];
     let islands = hole.charted().map_or(&[][..], |hole| &hole.islands);
     let is_loose = |l: &&BoundaryLoop| {
-        l.kind == LoopKind::Outer && l.component != rim.component && !islands.contains(&l.id)
+        l.kind == LoopKind::Outer
+            && l.component != rim.component
+            && !l.vertices.is_empty()
+            && !islands.contains(&l.id)
     };
     let others = welded.loops.iter().filter(is_loose);
     let mut others = others.peekable();

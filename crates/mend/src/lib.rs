@@ -1,7 +1,8 @@
 //! Mends scans: synchronous functions that take a scan and give the mended scan and a report. The only crate that knows
 //! all stages.
 //!
-//! In order: `welded_scan` welds the triangles and finds the boundary loops, `select` matches a request to loops,
+//! In order: `welded_scan` welds the triangles and finds the boundary loops, `cut` takes damaged cloth out, `border`
+//! closes bites at the cloth's own edge, `select` matches a request to loops,
 //! `prepare` lays the cloth around a hole flat and makes a `hole` of it (a `prepared_hole` is this, or a `fair_hole` where
 //! the cloth cannot be laid flat), `constraints` places anchors and gestures on
 //! it, `moved_fill` asks the network for cloth that moved, `fill_hole` meshes it, `separate` pushes neighbouring
@@ -14,9 +15,13 @@
 
 mod addition;
 mod anchor_search;
+mod bites;
+mod border;
 mod call_pools;
 mod constraints;
 mod context;
+mod cut;
+mod cut_faces;
 #[cfg(test)]
 mod defect_tests;
 mod doubts;
@@ -43,6 +48,7 @@ mod scan_notes;
 mod select;
 mod separate;
 mod session;
+mod suspects;
 #[cfg(test)]
 mod testing;
 mod timings;
@@ -51,7 +57,7 @@ mod welded_scan;
 use std::time::Instant;
 
 use darn_budget::Budget;
-use darn_contract::port::Mended;
+use darn_contract::port::{HolesQuery, Mended};
 use darn_contract::{Anchor, Constraints, Search, v1};
 use darn_gltf_scan::Scan;
 
@@ -129,11 +135,15 @@ pub fn anchor_of(found: &v1::AnchorFound, search: &Search) -> Constraints {
     }
 }
 
-/// Every boundary loop of a scan, with its kind and size.
+/// Every boundary loop of a scan, with its kind and size, and what else the query wants.
 ///
 /// # Errors
 /// `Exhausted`.
-pub fn find_holes(scan: &Scan, budget: &Budget) -> Result<v1::HolesReport, MendError> {
+pub fn find_holes(
+    scan: &Scan,
+    wanted: HolesQuery,
+    budget: &Budget,
+) -> Result<v1::HolesReport, MendError> {
     let started = Instant::now();
     let welded = WeldedScan::of(scan, budget)?;
     budget.hold(LOOP_REPORT * welded.loops.len())?;
@@ -142,8 +152,14 @@ pub fn find_holes(scan: &Scan, budget: &Budget) -> Result<v1::HolesReport, MendE
         budget.spend(LOOP_WORK)?;
         loops.push(welded.loop_report(rim, scan));
     }
+    let suspects = match wanted.suspects {
+        true => suspects::suspects(&welded, budget)?,
+        false => Vec::new(),
+    };
     Ok(v1::HolesReport {
         loops,
+        candidates: border::candidates(&welded, budget)?,
+        suspects,
         components: welded.topology.components as u32,
         vertices: welded.surface.mesh.positions.len() as u32,
         faces: welded.surface.mesh.faces.len() as u32,
@@ -201,7 +217,7 @@ mod tests {
     fn a_tangle_costs_no_more_than_its_size_allows() {
         for n in [16, 32] {
             let scan = scan_of(&tangle(n));
-            let holes = find_holes(&scan, Budget::unlimited()).unwrap();
+            let holes = find_holes(&scan, HolesQuery::default(), Budget::unlimited()).unwrap();
             assert!(!holes.loops.is_empty());
             // 36 bytes a vertex of positions and normals are more than the file has.
             let bytes = 36 * scan.surface.positions.len() as u64;
@@ -286,7 +302,7 @@ mod tests {
         };
         let bytes = darn_gltf_scan::export::glb(&named).unwrap();
         let scan = Scan::read(bytes, &Default::default()).unwrap();
-        let report = find_holes(&scan, Budget::unlimited()).unwrap();
+        let report = find_holes(&scan, HolesQuery::default(), Budget::unlimited()).unwrap();
         assert_eq!(report.loops.len(), 2);
         assert!(report.loops.iter().all(|l| l.mesh.len() < 300));
     }

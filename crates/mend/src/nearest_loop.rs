@@ -43,10 +43,10 @@ impl<'a> NearestLoop<'a> {
     pub fn to(&mut self, point: &Vec3) -> Result<Result<&'a BoundaryLoop, String>, Exhausted> {
         let mesh = &self.welded.surface.mesh;
         let balls = self.balls.get_or_insert_with(|| {
-            let loops = &self.welded.loops;
-            let only_outer = loops.iter().all(|l| l.kind == LoopKind::Outer);
+            let loops = || self.welded.loops.iter().filter(|l| !l.vertices.is_empty());
+            let only_outer = loops().all(|l| l.kind == LoopKind::Outer);
             let looked_at = |l: &&BoundaryLoop| only_outer || l.kind != LoopKind::Outer;
-            let rims = loops.iter().filter(looked_at);
+            let rims = loops().filter(looked_at);
             rims.map(|rim| RimBall::of(rim, mesh)).collect()
         });
         self.steps.take(BALL_WORK * balls.len() as u64)?;

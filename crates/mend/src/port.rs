@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use darn_budget::Budget;
-use darn_contract::port::{EditSession, Mended, Mender, PatchForm, Patches, Refusal};
+use darn_contract::port::{EditSession, HolesQuery, Mended, Mender, PatchForm, Patches, Refusal};
 use darn_contract::{Constraints, Search, error_chain, v1};
 use darn_gltf_scan::Scan;
 
@@ -93,10 +93,15 @@ impl Mender for SharedMender {
         Ok(Box::new(session))
     }
 
-    fn find_holes(&self, scan: Bytes, budget: &Budget<'_>) -> Result<v1::HolesReport, Refusal> {
+    fn find_holes(
+        &self,
+        scan: Bytes,
+        wanted: HolesQuery,
+        budget: &Budget<'_>,
+    ) -> Result<v1::HolesReport, Refusal> {
         self.0.pools.run(budget, || {
             let (scan, read) = self.scan(scan, budget)?;
-            let mut found = crate::find_holes(&scan, budget).map_err(refusal)?;
+            let mut found = crate::find_holes(&scan, wanted, budget).map_err(refusal)?;
             add_read_time(&mut found.timings, read);
             Ok(found)
         })

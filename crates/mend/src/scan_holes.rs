@@ -7,7 +7,9 @@ use rayon::prelude::*;
 
 use crate::VERSION;
 use crate::addition::PatchSource;
+use crate::border;
 use crate::context::HoleContext;
+use crate::cut::CutScan;
 use crate::error::MendError;
 use crate::fill_hole::PatchDraft;
 use crate::hole_report::FilledHole;
@@ -26,7 +28,9 @@ use darn_gltf_scan::{PatchPrimitive, Scan};
 
 /// A scan's holes, prepared.
 pub struct ScanHoles {
-    /// The scan's surface.
+    /// The scan without what the request cuts out; `None` when it cuts nothing out.
+    cut: Option<Scan>,
+    /// The scan's surface, without what the request cuts out.
     pub welded: WeldedScan,
     /// The holes, in order of id.
     pub holes: Vec<PreparedHole>,
@@ -63,9 +67,26 @@ impl ScanHoles {
         constraints: &Constraints,
         call: Call,
     ) -> Result<ScanHoles, MendError> {
-        let welded = WeldedScan::of(scan, call.budget)?;
-        let selection = Selection::of(scan, &welded, constraints, call.budget)?;
-        Self::prepare(welded, selection, constraints, call)
+        let whole = WeldedScan::of(scan, call.budget)?;
+        let (cut, welded) = match CutScan::of(scan, &whole, constraints, call.budget)? {
+            Some(CutScan { scan, welded }) => (Some(scan), welded),
+            None => (None, whole),
+        };
+        let seen = cut.as_ref().unwrap_or(scan);
+        let welded = border::closed(seen, welded, constraints, call.budget)?;
+        let selection = Selection::of(seen, &welded, constraints, call.budget)?;
+        let holes = Self::prepare(welded, selection, constraints, call)?;
+        Ok(ScanHoles { cut, ..holes })
+    }
+
+    /// The scan without what the request cut out.
+    fn seen<'a>(&'a self, scan: &'a Scan) -> &'a Scan {
+        self.cut.as_ref().unwrap_or(scan)
+    }
+
+    /// Bytes of memory that it holds, estimated; without its holes.
+    pub fn bytes(&self) -> usize {
+        self.welded.bytes() + self.cut.as_ref().map_or(0, Scan::bytes_held)
     }
 
     /// Prepares the one hole that a search is about.
@@ -117,6 +138,7 @@ impl ScanHoles {
         let Sorted { filled, failed } = sorted(&selection.requests, holes, &welded)?;
         let selection = selection.without(failed);
         Ok(ScanHoles {
+            cut: None,
             holes: filled,
             welded,
             prepare_ms: milliseconds(started),
@@ -146,6 +168,21 @@ impl ScanHoles {
         later: &Constraints,
         call: Call<'a>,
     ) -> Result<FilledScan<'a>, MendError> {
+        let late: Vec<FieldError> = (later.holes.iter().enumerate())
+            .filter_map(|(i, selector)| {
+                let member = match selector {
+                    HoleSelector::Cut(_) => "cut",
+                    HoleSelector::Border(_) => "border",
+                    _ => return None,
+                };
+                let detail = "said when the scan is opened; open it anew for another choice";
+                Some(FieldError::new(format!("/holes/{i}/{member}"), detail))
+            })
+            .collect();
+        if !late.is_empty() {
+            return Err(MendError::Constraints(late));
+        }
+        let scan = self.seen(scan);
         let selection = match later.holes.is_empty() {
             true => self.selection.with_constraints(later)?,
             false => Selection::of(scan, &self.welded, later, call.budget)?,
@@ -206,7 +243,7 @@ impl ScanHoles {
         let additions = self.additions(scan, &filled, call.budget)?;
         let additions_ms = milliseconds(started);
         let started = Instant::now();
-        let bytes = scan.write_within(&additions, call.budget)?;
+        let bytes = self.seen(scan).write_within(&additions, call.budget)?;
         let mut report = self.report(scan, filled);
         if let Some(timings) = &mut report.timings {
             timings.write = milliseconds(started);
@@ -230,7 +267,7 @@ impl ScanHoles {
         budget: &Budget,
     ) -> Result<Vec<PatchPrimitive>, MendError> {
         let source = PatchSource {
-            scan,
+            scan: self.seen(scan),
             welded: &self.welded,
             card: filled.inpainter.card(),
             budget,
@@ -242,7 +279,7 @@ impl ScanHoles {
 
     /// The report of the whole scan.
     pub fn report(&self, scan: &Scan, filled: FilledScan) -> v1::Report {
-        let mut notes = scan_notes::notes(&self.welded, scan);
+        let mut notes = scan_notes::notes(&self.welded, self.seen(scan));
         notes.extend(filled.inpainter.note.clone());
         let holes_ms = self.prepare_ms + filled.fill_ms;
         let timings = self.welded.timings;

@@ -11,7 +11,7 @@ const MAX_NAMED: usize = 5;
 
 /// What a person should know about a scan as a whole.
 pub fn notes(welded: &WeldedScan, scan: &Scan) -> Vec<String> {
-    let mut notes = Vec::new();
+    let mut notes = welded.cuts.notes.clone();
     let unjoined = welded.topology.non_manifold.len();
     if unjoined > 0 {
         notes.push(format!(

@@ -80,6 +80,12 @@ impl Selection {
         }
         for (i, selector) in constraints.holes.iter().enumerate() {
             let rim = match selector {
+                HoleSelector::Cut(_) | HoleSelector::Border(_) => {
+                    for id in welded.cuts.of_entry(i) {
+                        requests.add(*id).named = true;
+                    }
+                    continue;
+                }
                 HoleSelector::Id(id) => with_id(welded, *id),
                 HoleSelector::Near(point) => near.to(&Vec3::from(*point))?,
             };
@@ -223,6 +229,9 @@ fn nameable(
     if except.contains(&rim.id.0) {
         return Err(format!("loop {} is also among `except`", rim.id));
     }
+    if rim.vertices.is_empty() {
+        return Err(format!("loop {} is {CUT_AWAY}", rim.id));
+    }
     if !welded.on_first_instance(scan, rim) {
         return Err(format!(
             "loop {} is never filled: it is {SAME_MESH}",
@@ -234,6 +243,9 @@ fn nameable(
 
 const SAME_MESH: &str =
     "a hole of a mesh that another node draws, too; the patch there shows here as well";
+
+const CUT_AWAY: &str =
+    "no loop any more: its cloth was cut out, or a cut joined it to another loop";
 
 /// Why a loop is left as it is.
 struct SkipReason {
@@ -262,6 +274,9 @@ fn reason_to_skip(
         None if constraints.holes.is_empty() => Some(Fill::Holes),
         fill => fill,
     };
+    if rim.vertices.is_empty() {
+        return SkipReason::new("cut_away", CUT_AWAY);
+    }
     match (rim.kind, fill) {
         (LoopKind::Outer, _) => {
             let phrase = "the cloth's own edge, the outer boundary; name it to fill it";

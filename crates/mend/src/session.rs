@@ -76,7 +76,7 @@ impl ScanSession {
     pub fn bytes(&self) -> usize {
         let holes: usize = self.holes.holes.iter().map(PreparedHole::bytes).sum();
         let described: usize = self.described.holes.iter().map(hole_bytes).sum();
-        let counted = self.scan.bytes_held() + self.holes.welded.bytes() + holes + described;
+        let counted = self.scan.bytes_held() + self.holes.bytes() + holes + described;
         counted + counted / 2
     }
 

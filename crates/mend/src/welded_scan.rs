@@ -4,8 +4,10 @@ use std::time::Instant;
 
 use darn_budget::{Budget, Exhausted};
 
+use crate::cut::CutLoops;
 use crate::timings::milliseconds;
 use darn_contract::{excerpt, v1};
+use darn_geometry::mesh::TriMesh;
 use darn_geometry::mesh::index::FaceId;
 use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind, boundary_loops};
 use darn_geometry::mesh::openings::Evidence;
@@ -21,10 +23,12 @@ pub struct WeldedScan {
     pub surface: WeldedMesh,
     /// Its topology.
     pub topology: Topology,
-    /// Its boundary loops; a loop's id is its index here.
+    /// Its boundary loops; a loop's id is its index here. One without vertices was there before the request's cuts.
     pub loops: Vec<BoundaryLoop>,
     /// Per loop whether it is a hole of a second skin, which is not filled again.
     pub second_skins: Vec<Option<SecondSkin>>,
+    /// What the request's cuts did.
+    pub cuts: CutLoops,
     /// Milliseconds of welding and of finding the loops.
     pub timings: v1::ScanTimings,
 }
@@ -51,11 +55,23 @@ impl WeldedScan {
     /// # Errors
     /// `Exhausted`.
     pub fn of(scan: &Scan, budget: &Budget) -> Result<WeldedScan, Exhausted> {
+        Self::of_surface(scan, &scan.surface, budget)
+    }
+
+    /// Welds a scan's surface with further triangles behind it, which belong to no face of the scan.
+    ///
+    /// # Errors
+    /// `Exhausted`.
+    pub fn of_surface(
+        scan: &Scan,
+        surface: &TriMesh,
+        budget: &Budget,
+    ) -> Result<WeldedScan, Exhausted> {
         let started = Instant::now();
-        let faces = scan.surface.faces.len();
+        let faces = surface.faces.len();
         budget.hold(WELDING * faces)?;
         budget.spend_at_once(WELD_WORK * faces as u64)?;
-        let surface = weld_within(&scan.surface, &|v| scan.precision(v), budget)?;
+        let surface = weld_within(surface, &|v| scan.precision(v), budget)?;
         let weld = milliseconds(started);
         let started = Instant::now();
         budget.spend_at_once(LOOPS_WORK * faces as u64)?;
@@ -72,11 +88,26 @@ impl WeldedScan {
             topology,
             loops,
             second_skins,
+            cuts: CutLoops::default(),
             timings,
         };
         budget.release(WELDING * faces);
         budget.hold(welded.bytes())?;
         Ok(welded)
+    }
+
+    /// Puts the loops in the order of their ids, which changed.
+    ///
+    /// # Errors
+    /// `Exhausted`.
+    pub fn renumbered(
+        &mut self,
+        loops: Vec<BoundaryLoop>,
+        budget: &Budget,
+    ) -> Result<(), Exhausted> {
+        self.second_skins = second_skins(&self.surface.mesh, &loops, budget)?;
+        self.loops = loops;
+        Ok(())
     }
 
     /// Bytes of memory that it holds, estimated.
@@ -97,7 +128,7 @@ impl WeldedScan {
         }
     }
 
-    /// The scan's face that a welded face was made of.
+    /// The scan's face that a welded face was made of; none for those behind its surface.
     pub fn source(&self, scan: &Scan, face: FaceId) -> Option<SourceFace> {
         let own = *self.surface.soup_face.get(face.index())?;
         Some(SourceFace {

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use bytes::Bytes;
 use clap::Parser;
 use darn_budget::Budget;
-use darn_contract::port::{EditSession, Mended, Mender, Refusal};
+use darn_contract::port::{EditSession, HolesQuery, Mended, Mender, Refusal};
 use darn_contract::{Constraints, Search, codes, v1};
 use darn_serve::{LogDelivery, LogError, ServeArgs, ServeError, run, start_logging};
 
@@ -33,7 +33,12 @@ impl Mender for Echo {
         })
     }
 
-    fn find_holes(&self, _: Bytes, _: &Budget<'_>) -> Result<v1::HolesReport, Refusal> {
+    fn find_holes(
+        &self,
+        _: Bytes,
+        _: HolesQuery,
+        _: &Budget<'_>,
+    ) -> Result<v1::HolesReport, Refusal> {
         Ok(v1::HolesReport::default())
     }
 

@@ -20,7 +20,7 @@ use super::{
     telemetry::RequestId,
     uploads::BodySize,
 };
-use darn_contract::port::Mended;
+use darn_contract::port::{HolesQuery, Mended};
 use darn_contract::{
     Constraints, Search, excerpt,
     v1::{self, AnchorFound, HolesReport, InpaintChunk, ScanChunk, inpaint_chunk::Part},
@@ -83,11 +83,15 @@ impl GrpcService {
         &self,
         request: Request<Streaming<ScanChunk>>,
     ) -> Result<HolesReport, RequestError> {
-        let received = self.receive(request).await?;
-        let ScanRequest { scan, upload, .. } = received.without_constraints()?;
+        let ScanRequest {
+            scan,
+            parameters,
+            upload,
+        } = self.receive::<HolesQuery>(request).await?;
+        let wanted = parameters.unwrap_or_default();
         self.0
             .submit(upload, scan.len(), move |mender, budget| {
-                mender.find_holes(scan, budget)
+                mender.find_holes(scan, wanted, budget)
             })
             .await
     }
@@ -153,9 +157,9 @@ impl GrpcService {
                 }
                 parameters = Some(P::from_message(&message)?);
             }
-            if chunk.constraints.is_some() || chunk.query.is_some() {
+            if chunk.constraints.is_some() || chunk.query.is_some() || chunk.holes.is_some() {
                 return Err(RequestError::Malformed(
-                    "OptimizeAnchor takes a query and no constraints, the other methods no query"
+                    "Inpaint takes `constraints`, OptimizeAnchor `query`, FindHoles `holes`, and none of them another's"
                         .to_owned(),
                 ));
             }
@@ -191,6 +195,12 @@ impl ChunkParameters for Constraints {
 impl ChunkParameters for Search {
     fn take(chunk: &mut ScanChunk) -> Option<v1::AnchorQuery> {
         chunk.query.take()
+    }
+}
+
+impl ChunkParameters for HolesQuery {
+    fn take(chunk: &mut ScanChunk) -> Option<v1::HolesQuery> {
+        chunk.holes.take()
     }
 }
 

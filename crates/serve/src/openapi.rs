@@ -133,12 +133,18 @@ fn mended(description: &str, part: &str, media_types: &[&str]) -> Value {
 
 fn holes() -> Value {
     let found = json!({
-        "description": "Every boundary loop of the scan",
+        "description": "Every boundary loop of the scan, and what a mesher has probably sealed where that is asked for",
         "content": { JSON: { "schema": reference("HolesReport") } },
     });
     json!({
         "summary": "Find the boundary loops of a scan, and which of them are holes",
         "operationId": "findHoles",
+        "parameters": [{
+            "name": "suspects",
+            "in": "query",
+            "description": "Whether what a mesher has probably sealed is listed, too, each with a cut that takes it out",
+            "schema": { "type": "boolean", "default": false },
+        }],
         "requestBody": body(&[], &[]),
         "responses": responses("200",
             found, "A scan whose holes cannot be found, or constraints, which are not taken here"),

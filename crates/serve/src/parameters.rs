@@ -6,7 +6,8 @@ use super::{
     error::{ParameterKind, RequestError},
     media_types::{JSON, OCTET_STREAM},
 };
-use darn_contract::{Constraints, FieldError, Search, from_json, v1};
+use darn_contract::port::HolesQuery;
+use darn_contract::{Constraints, FieldError, Search, excerpt, from_json, v1};
 
 /// Largest JSON text of constraints or a query, in bytes.
 pub const MAX_BYTES: usize = 1 << 20;
@@ -78,6 +79,46 @@ impl Parameters for Search {
     fn check_message(message: &v1::AnchorQuery) -> Result<Self, Vec<FieldError>> {
         Self::check(message)
     }
+}
+
+/// What is wanted beside a scan's loops; over HTTP it is the URL's query.
+impl Parameters for HolesQuery {
+    const KIND: ParameterKind = ParameterKind::Query;
+    const PART: &'static str = "holes";
+    type Message = v1::HolesQuery;
+
+    fn check_message(message: &v1::HolesQuery) -> Result<Self, Vec<FieldError>> {
+        Ok(Self {
+            suspects: message.suspects,
+        })
+    }
+}
+
+/// Reads the query of a URL, such as `suspects=true`; a name alone counts as true.
+///
+/// # Errors
+/// `Malformed` for a name or a value that is not known.
+pub fn holes_query(query: Option<&str>) -> Result<HolesQuery, RequestError> {
+    let mut wanted = HolesQuery::default();
+    for pair in query
+        .unwrap_or_default()
+        .split('&')
+        .filter(|p| !p.is_empty())
+    {
+        let (name, value) = pair.split_once('=').unwrap_or((pair, "true"));
+        wanted.suspects = match (name, value) {
+            ("suspects", "true") => true,
+            ("suspects", "false") => false,
+            _ => {
+                let detail = format!(
+                    "`{}` is not known; the URL's query is `suspects=true` or `suspects=false`",
+                    excerpt(pair)
+                );
+                return Err(RequestError::Malformed(detail));
+            }
+        };
+    }
+    Ok(wanted)
 }
 
 /// Allows only constraints that deform cloth: those of a request to an open session, whose holes and weights are already chosen.

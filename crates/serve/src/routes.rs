@@ -24,7 +24,7 @@ use super::{
     counted::counted_answer,
     error::RequestError,
     media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, PROMETHEUS},
-    openapi,
+    openapi, parameters,
     response::{self, ANCHOR_DISTANCE, HOLES_FILLED, LOOPS_SKIPPED, MendResponse, RESULT},
     session_routes,
     telemetry::{REQUEST_ID, RequestId},
@@ -162,11 +162,18 @@ async fn inpaint(State(app): State<Arc<App>>, request: Request) -> Result<Respon
 }
 
 async fn holes(State(app): State<Arc<App>>, request: Request) -> Result<Response, RequestError> {
+    let wanted = match parameters::holes_query(request.uri().query()) {
+        Ok(wanted) => wanted,
+        Err(error) => {
+            body::discard(request, &app.limits);
+            return Err(error);
+        }
+    };
     let received = body::receive_scan(&app, request).await?;
     let ScanRequest { scan, upload, .. } = received.without_constraints()?;
     let text = app
         .submit(upload, scan.len(), move |mender, budget| {
-            Ok(response::json(&mender.find_holes(scan, budget)?))
+            Ok(response::json(&mender.find_holes(scan, wanted, budget)?))
         })
         .await?;
     Ok(response::json_response(text))

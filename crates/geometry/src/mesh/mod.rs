@@ -9,6 +9,7 @@
 mod border;
 pub(crate) mod bounds;
 pub mod curvature;
+pub mod cut;
 pub mod defects;
 pub mod denoise;
 mod geodesic;
@@ -19,6 +20,7 @@ pub mod island;
 mod joints;
 pub mod layers;
 pub mod loops;
+pub mod membranes;
 pub mod nearest;
 pub mod openings;
 mod pairing;

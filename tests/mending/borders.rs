@@ -1,0 +1,119 @@
+//! Bites, rips and torn corners at the cloth's own edge.
+
+use darn_budget::Budget;
+use darn_contract::port::HolesQuery;
+use darn_contract::{Border, Constraints, HoleSelector, v1};
+use darn_geometry::mesh::loops::LoopKind;
+use darn_geometry::mesh::shapes::sheet;
+use darn_geometry::mesh::weld::weld;
+use darn_geometry::mesh::{TriMesh, Vec3};
+use darn_mend::find_holes;
+
+use super::cloth::{MendedScan, area, mended, packed, read};
+
+fn asking(border: Border) -> Constraints {
+    Constraints {
+        holes: vec![HoleSelector::Border(border)],
+        ..Constraints::default()
+    }
+}
+
+/// A sheet of 48 squares a side without what `keep` leaves out, folded along v.
+fn torn(keep: impl Fn(f64, f64) -> bool, fold: f64) -> TriMesh {
+    weld(&sheet(48, keep, |u, v| {
+        Vec3::new(u, v, fold * (9.0 * u).sin())
+    }))
+    .mesh
+}
+
+fn bitten(u: f64, v: f64) -> bool {
+    (u - 0.5).hypot(v) > 0.14
+}
+
+fn candidates(bytes: &[u8]) -> Vec<v1::BorderCandidate> {
+    let found = find_holes(&read(bytes), HolesQuery::default(), Budget::unlimited());
+    found.unwrap().candidates
+}
+
+/// The area of the patch over the area that is missing from the whole sheet.
+fn share_mended(bytes: &[u8], mesh: &TriMesh, fold: f64) -> f64 {
+    let after = MendedScan::of(bytes);
+    assert!(
+        after.loops.iter().all(|l| l.kind == LoopKind::Outer),
+        "{:?}",
+        after.loops.len()
+    );
+    assert!(after.topology.non_manifold.is_empty());
+    after.patch_area() / (area(&torn(|_, _| true, fold)) - area(mesh))
+}
+
+#[test]
+fn a_bite_is_told_and_left_until_it_is_asked_for() {
+    for fold in [0.0, 0.04] {
+        let mesh = torn(bitten, fold);
+        let bytes = packed(&mesh, &[]);
+        let told = candidates(&bytes);
+        assert_eq!(told.len(), 1, "{told:?}");
+        let error = mended(&bytes, &Constraints::default()).unwrap_err();
+        assert_eq!(error.code().word, "no_holes");
+
+        let auto = mended(&bytes, &asking(Border::Auto)).unwrap();
+        assert_eq!(auto.report.holes.len(), 1);
+        let share = share_mended(&auto.bytes, &mesh, fold);
+        assert!((0.93..1.07).contains(&share), "fold {fold}: {share}");
+        for p in MendedScan::of(&auto.bytes).new_positions() {
+            let off = p.z - fold * (9.0 * p.x).sin();
+            assert!(off.abs() < 0.02 && p.y > -0.03, "fold {fold}: {p:?}");
+        }
+        // The scan's bytes stay, and the candidate says the same as `auto`.
+        assert!(
+            read(&auto.bytes)
+                .surface
+                .faces
+                .starts_with(&read(&bytes).surface.faces)
+        );
+        let message = v1::Constraints {
+            holes: vec![v1::HoleSelector {
+                border: told[0].border.clone(),
+                ..Default::default()
+            }],
+            ..Default::default()
+        };
+        let named = Constraints::check(&message).expect("a stretch that can be sent");
+        assert!(mended(&bytes, &named).unwrap().bytes == auto.bytes);
+    }
+}
+
+#[test]
+fn a_rip_is_closed_and_a_torn_corner_is_mended_up_to_a_line() {
+    let ripped = torn(|u, v| (u - 0.5).abs() > 0.015 || v > 0.4, 0.0);
+    let answer = mended(&packed(&ripped, &[]), &asking(Border::Auto)).unwrap();
+    let share = share_mended(&answer.bytes, &ripped, 0.0);
+    assert!((0.9..1.1).contains(&share), "{share}");
+
+    let corner = torn(|u, v| u + v > 0.3, 0.0);
+    let line = Border::Line {
+        from: [0.0, 0.32, 0.0],
+        to: [0.32, 0.0, 0.0],
+        along: vec![[0.0; 3]],
+    };
+    let answer = mended(&packed(&corner, &[]), &asking(line)).unwrap();
+    let share = share_mended(&answer.bytes, &corner, 0.0);
+    assert!((0.97..1.03).contains(&share), "{share}");
+}
+
+#[test]
+fn a_border_without_a_bite_is_refused_at_its_place() {
+    let whole = packed(&torn(|_, _| true, 0.0), &[]);
+    assert!(candidates(&whole).is_empty());
+    let same = Border::Line {
+        from: [0.5, 0.0, 0.0],
+        to: [0.501, 0.0, 0.0],
+        along: Vec::new(),
+    };
+    for (border, told) in [(Border::Auto, "no bite"), (same, "same vertex")] {
+        let error = mended(&whole, &asking(border)).unwrap_err();
+        assert_eq!(error.fields()[0].pointer, "/holes/0/border");
+        assert!(error.to_string().contains(told), "{error}");
+    }
+}
