@@ -1,6 +1,7 @@
 //! Mends generated scans and garments end to end, like requests: the mesh is written as GLB, read, mended and read again.
 
 use darn_budget::Budget;
+use darn_contract::port::HolesQuery;
 use darn_contract::v1::LoopKind;
 use darn_contract::{Constraints, HoleSelector};
 use darn_geometry::mesh::{TriMesh, Vec3, weld};
@@ -32,7 +33,11 @@ pub fn mended_at(
 pub fn listed(mesh: &TriMesh) -> Result<Vec<ListedLoop>, EvaluateError> {
     let list = || -> Result<_, BoxedError> {
         let scan = Scan::read(as_glb("scan", mesh)?, &ScanLimits::default())?;
-        Ok(darn_mend::find_holes(&scan, Budget::unlimited())?)
+        Ok(darn_mend::find_holes(
+            &scan,
+            HolesQuery::default(),
+            Budget::unlimited(),
+        )?)
     };
     let report = list().map_err(EvaluateError::Mender)?;
     let listed = |l: &darn_contract::v1::Loop| ListedLoop {

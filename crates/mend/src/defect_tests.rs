@@ -1,6 +1,7 @@
 //! Laws of mending scans with defects that files have and cloth has not.
 
 use darn_budget::Budget;
+use darn_contract::port::HolesQuery;
 use darn_contract::{Constraints, v1};
 use darn_geometry::mesh::defects::{Defect, with_defects};
 use darn_geometry::mesh::shapes::{concat, holed_sheet, sheet};
@@ -43,7 +44,8 @@ fn every_hole_of_a_scan_with_defects_is_filled_and_nothing_else() {
         let (faces, vertices) = (scan.surface.faces.len(), scan.surface.positions.len());
         assert_eq!(after.surface.faces[..faces], scan.surface.faces);
         assert_eq!(after.surface.positions[..vertices], scan.surface.positions);
-        let found = find_holes(&after, Budget::unlimited()).expect("no budget");
+        let found =
+            find_holes(&after, HolesQuery::default(), Budget::unlimited()).expect("no budget");
         let open = [v1::LoopKind::Hole, v1::LoopKind::OuterBoundary].map(|k| count(&found, k));
         assert_eq!(open, [0, 1], "{seed} {kinds:?}");
     }
