@@ -14,14 +14,15 @@ use super::topology::Topology;
 
 /// Least length of a spike ÷ width of its neck. Triangles of a scan are seldom half as long.
 const NARROW: f64 = 2.0;
-/// Least length of a spike ÷ median edge of the cloth at the rim: short teeth belong to a ragged tear.
-const LONG: f64 = 2.0;
+/// Least length of a spike ÷ median edge of the cloth at the rim: short teeth belong to a ragged tear. With 2, teeth of clean cuts through a
+/// triangulation are taken for spikes.
+const LONG: f64 = 3.0;
 /// Nanoseconds of work a rim vertex or face.
 const STEP_WORK: u64 = 100;
 
 /// The faces of all spikes and threads at a rim, ascending: pieces beyond an inner edge between two of its vertices
-/// (their neck) of at least twice the length of the neck and of the cloth's edges. Half of its border is a piece's
-/// length.
+/// (their neck) of at least twice the length of the neck and three times that of the cloth's edges. Half of its border
+/// is a piece's length.
 ///
 /// # Errors
 /// `Exhausted`.
