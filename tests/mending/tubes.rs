@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use darn_budget::Budget;
-use darn_contract::{Anchor, Constraints, Edit, Gesture};
+use darn_contract::{Anchor, Constraints, Edit, Gesture, HoleSelector};
 use darn_geometry::mesh::curvature::face_areas;
 use darn_geometry::mesh::loops::LoopKind;
 use darn_geometry::mesh::shapes::sheet;
@@ -79,10 +79,18 @@ fn nearly_cut_through() -> Vec<u8> {
     packed(&sleeve(keep, |_, _| 0.0), &[])
 }
 
+/// What fills that hole: its rim is so even that it is taken for an opening, which is filled when it is named.
+fn named() -> Constraints {
+    Constraints {
+        holes: vec![HoleSelector::Id(1)],
+        ..Constraints::default()
+    }
+}
+
 #[test]
 fn a_hole_without_a_chart_gets_a_fair_surface_and_the_report_says_so() {
     let bytes = nearly_cut_through();
-    let done = mended(&bytes, &Constraints::default()).expect("a fair surface");
+    let done = mended(&bytes, &named()).expect("a fair surface");
     let [hole] = &done.report.holes[..] else {
         panic!("one hole, not {}", done.report.holes.len());
     };
@@ -102,7 +110,7 @@ fn a_hole_without_a_chart_gets_a_fair_surface_and_the_report_says_so() {
         assert!((radius - 1.0).abs() < 0.05, "{radius}");
     }
     // The same bytes every time.
-    let again = mended(&bytes, &Constraints::default()).expect("a fair surface");
+    let again = mended(&bytes, &named()).expect("a fair surface");
     assert!(again.bytes == done.bytes);
 }
 
@@ -122,7 +130,7 @@ fn anchors_and_gestures_on_a_hole_without_a_chart_are_refused_by_their_pointers(
                 offset: [0.0, 0.0, 0.1],
             },
         }],
-        ..Constraints::default()
+        ..named()
     };
     let error = mended(&nearly_cut_through(), &asked).expect_err("a refusal");
     assert_eq!(error.code(), darn_contract::codes::CONSTRAINTS_DO_NOT_FIT);
@@ -134,7 +142,7 @@ fn anchors_and_gestures_on_a_hole_without_a_chart_are_refused_by_their_pointers(
 fn a_session_holds_a_hole_without_a_chart() {
     let scan = read(&nearly_cut_through());
     let never = Budget::unlimited();
-    let opening = Constraints::default();
+    let opening = named();
     let session =
         ScanSession::open(scan, &opening, Arc::clone(mender()), never).expect("a session");
     let described = session.described();
