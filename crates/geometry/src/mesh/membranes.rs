@@ -262,7 +262,19 @@ mod tests {
         }
         let loops = boundary_loops(&mesh, &Topology::new(&mesh));
         let hole = loops.iter().find(|l| l.kind == LoopKind::Hole).unwrap();
-        let rim: Vec<u32> = hole.vertices.iter().map(|v| v.0).collect();
+        let mut rim: Vec<u32> = hole.vertices.iter().map(|v| v.0).collect();
+        // A fan's first and last triangles must not be triangles that the sheet has.
+        let is_face = |corners: [u32; 3]| {
+            mesh.faces
+                .iter()
+                .any(|f| corners.iter().all(|v| f.contains(v)))
+        };
+        let at = |k: usize| rim[k % rim.len()];
+        let starts = (2..rim.len() + 2).find(|k| {
+            !is_face([at(*k), at(k + 1), at(k + 2)]) && !is_face([at(*k), at(k - 1), at(k - 2)])
+        });
+        let start = starts.unwrap() % rim.len();
+        rim.rotate_left(start);
         let before = mesh.faces.len();
         if from_middle {
             let middle = mesh.positions.len() as u32;
