@@ -25,7 +25,7 @@ pub(super) struct Joints {
     pub twins: Twins,
     /// The pairs that run the same way: one of their faces is to be turned.
     pub same_way: Vec<[HalfEdgeId; 2]>,
-    /// All half-edges of each edge that more than two share, or two that are no pair.
+    /// All half-edges of each edge at which not every one has a partner.
     pub crowded: Vec<Vec<HalfEdgeId>>,
 }
 
@@ -71,8 +71,7 @@ pub(super) fn joints(
         let free = |h: HalfEdgeId| found.twins.of(h).is_none() && shared.binary_search(&h).is_err();
         let hangs = |h: &HalfEdgeId| free(h.next()) && free(h.previous());
         let pairs = chosen(placed, &group, hangs, &is_exact);
-        let is_crowded = group.len() > 2 || pairs.is_empty();
-        if is_crowded {
+        if 2 * pairs.len() < group.len() {
             found.crowded.push(group);
         }
         for [g, h] in pairs {

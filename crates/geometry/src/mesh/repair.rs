@@ -68,9 +68,10 @@ impl Repair<'_> {
         let slivers = self.border_slivers(&places, &pairing.twins);
         if !slivers.is_empty() {
             self.budget.spend_at_once(FACE_WORK * places.len() as u64)?;
+            let mut kept = vec![true; places.len()];
+            slivers.iter().for_each(|f| kept[f.index()] = false);
             set_aside.degenerate_faces = slivers.len();
-            let is_sliver = |f: usize| slivers.binary_search(&FaceId(f as u32)).is_ok();
-            faces = faces.only(|f| !is_sliver(f));
+            faces = faces.only(&kept);
             places = placed(&faces.corners, self.exact);
             pairing = pair_half_edges(&places, self.exact);
         }
@@ -181,20 +182,11 @@ impl Repair<'_> {
         for (corners, turned) in faces.corners.iter_mut().zip(&turning.turned) {
             if *turned {
                 corners.swap(1, 2);
+                set_aside.flipped_faces += 1;
             }
         }
         crowded.iter_mut().flatten().for_each(|h| *h = turned(*h));
-        let is_fin = fins(&twins, &crowded);
-        let flipped = turning.turned.iter().zip(&is_fin);
-        set_aside.flipped_faces = flipped.filter(|(turned, fin)| **turned && !**fin).count();
-        set_aside.fins = is_fin.iter().filter(|fin| **fin).count();
-        let (twins, non_manifold) = without(&is_fin, &twins, &crowded);
-        Ok(Repaired {
-            faces: faces.only(|f| !is_fin[f]),
-            twins,
-            non_manifold,
-            set_aside,
-        })
+        Ok(without_fins(faces, twins, &crowded, set_aside))
     }
 }
 
@@ -204,60 +196,72 @@ fn placed(corners: &[[u32; 3]], place: &[u32]) -> Vec<[u32; 3]> {
     corners.iter().map(face).collect()
 }
 
-/// Per face whether it belongs to a fin: a connected piece of few faces at an edge that larger pieces share.
-fn fins(twins: &Twins, crowded: &[Vec<HalfEdgeId>]) -> Vec<bool> {
-    let (component, count) = face_components(twins);
+/// Leaves out the fins: connected pieces of few faces that hang on an edge which others share.
+fn without_fins(
+    faces: Working,
+    twins: Twins,
+    crowded: &[Vec<HalfEdgeId>],
+    mut set_aside: SetAside,
+) -> Repaired {
+    let (component, count) = face_components(&twins);
     let mut size = vec![0usize; count];
     component.iter().for_each(|&c| size[c as usize] += 1);
     let most = MAX_FIN.min(component.len() / 4);
     let mut fin = vec![false; count];
     for group in crowded.iter().filter(|group| group.len() > 2) {
-        let pieces = || group.iter().map(|h| component[h.face().index()]);
+        let hanging = group.iter().filter(|h| twins.of(**h).is_none());
         // Where everything at an edge is small, its largest piece is the cloth.
-        let largest = pieces().max_by_key(|&c| (size[c as usize], Reverse(c)));
-        for c in pieces().filter(|&c| Some(c) != largest) {
+        let of = |h: &HalfEdgeId| component[h.face().index()];
+        let largest = group
+            .iter()
+            .map(of)
+            .max_by_key(|&c| (size[c as usize], Reverse(c)));
+        for c in hanging.map(of).filter(|&c| Some(c) != largest) {
             fin[c as usize] |= size[c as usize] <= most;
         }
     }
-    component.iter().map(|&c| fin[c as usize]).collect()
-}
-
-/// The twins of the faces that are no fins, which come off whole, and what
-/// [`Topology::non_manifold`](super::topology::Topology::non_manifold) lists of them.
-fn without(
-    is_fin: &[bool],
-    twins: &Twins,
-    crowded: &[Vec<HalfEdgeId>],
-) -> (Twins, Vec<HalfEdgeId>) {
-    let mut number = vec![0; is_fin.len()];
-    let kept = number.iter_mut().zip(is_fin).filter(|(_, fin)| !**fin);
-    (0u32..).zip(kept).for_each(|(k, (number, _))| *number = k);
+    let kept: Vec<bool> = component.iter().map(|&c| !fin[c as usize]).collect();
+    set_aside.fins = kept.iter().filter(|kept| !**kept).count();
+    let mut number = vec![0; kept.len()];
+    let mut next = 0;
+    for (number, _) in number.iter_mut().zip(&kept).filter(|(_, kept)| **kept) {
+        *number = next;
+        next += 1;
+    }
     let renumbered = |h: HalfEdgeId| FaceId(number[h.face().index()]).half_edges()[h.corner()];
-    let is_kept = |h: &HalfEdgeId| !is_fin[h.face().index()];
-    let is_shared = |group: &&Vec<HalfEdgeId>| group.iter().filter(|h| is_kept(h)).count() > 1;
-    let shared = crowded.iter().filter(is_shared).flatten();
-    let unjoined = shared.filter(|h| is_kept(h) && twins.of(**h).is_none());
-    let mut non_manifold: Vec<HalfEdgeId> = unjoined.map(|&h| renumbered(h)).collect();
+    let is_kept = |h: &HalfEdgeId| kept[h.face().index()];
+    let half_edges = (0..twins.len() as u32).map(HalfEdgeId);
+    let mut non_manifold: Vec<HalfEdgeId> = crowded
+        .iter()
+        .filter(|group| group.iter().filter(|h| is_kept(h)).count() > 1)
+        .flatten()
+        .filter(|h| is_kept(h) && twins.of(**h).is_none())
+        .map(|&h| renumbered(h))
+        .collect();
     non_manifold.sort_unstable();
     non_manifold.dedup();
-    let half_edges = (0..twins.len() as u32).map(HalfEdgeId).filter(is_kept);
-    let twins = half_edges.map(|h| twins.of(h).map(renumbered)).collect();
-    (twins, non_manifold)
+    let of_kept = half_edges.filter(is_kept);
+    Repaired {
+        twins: of_kept.map(|h| twins.of(h).map(renumbered)).collect(),
+        faces: faces.only(&kept),
+        non_manifold,
+        set_aside,
+    }
 }
 
 impl Working {
-    /// The faces whose indices pass a test.
-    fn only(self, test: impl Fn(usize) -> bool) -> Working {
-        fn filtered<T>(values: Vec<T>, test: impl Fn(usize) -> bool) -> Vec<T> {
-            let each = values.into_iter().enumerate();
-            each.filter(|(f, _)| test(*f))
-                .map(|(_, value)| value)
+    /// The faces that are kept.
+    fn only(self, kept: &[bool]) -> Working {
+        fn filtered<T>(values: Vec<T>, kept: &[bool]) -> Vec<T> {
+            let each = values.into_iter().zip(kept);
+            each.filter(|(_, kept)| **kept)
+                .map(|(value, _)| value)
                 .collect()
         }
         Working {
-            corners: filtered(self.corners, &test),
-            soup_face: filtered(self.soup_face, &test),
-            two_sided: filtered(self.two_sided, &test),
+            corners: filtered(self.corners, kept),
+            soup_face: filtered(self.soup_face, kept),
+            two_sided: filtered(self.two_sided, kept),
         }
     }
 

@@ -36,7 +36,7 @@ pub struct SetAside {
     pub degenerate_faces: usize,
     /// Faces left out because an earlier face has the same three places (whichever side it shows).
     pub duplicate_faces: usize,
-    /// Faces left out because they hang, in pieces of few, on an edge of a larger piece.
+    /// Faces left out because they hang, in pieces of few, on an edge that others share more smoothly.
     pub fins: usize,
     /// Faces turned to face the same way as those around them.
     pub flipped_faces: usize,
