@@ -299,7 +299,7 @@ mod tests {
                 panic!("{found:?}");
             };
             let missed = lid.abs_diff(membrane.faces.len());
-            assert!(missed <= 2, "{missed} of {lid}");
+            assert!(10 * missed <= lid, "{missed} of {lid}");
             assert_eq!(membrane.inner, usize::from(from_middle));
             assert!(membrane.rim.len() + 2 >= lid, "{}", membrane.rim.len());
             assert!((membrane.centroid - Vec3::new(0.5, 0.5, 0.0)).xy().norm() < 0.1);
