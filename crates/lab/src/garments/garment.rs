@@ -109,7 +109,7 @@ pub fn make(kind: GarmentKind, seed: u64) -> Result<Garment, GarmentError> {
         let draped = drape(&pattern, &sewn);
         let upright = |p: &crate::scarffolds::lattice::Vec3f| {
             // Without negative zeros, which welding does not keep.
-            Vec3::new(f64::from(p.x), f64::from(p.z), 0.0 - f64::from(p.y))
+            Vec3::new(p.x.into(), p.z.into(), (-p.y).into()).add_scalar(0.0)
         };
         let mesh = TriMesh {
             positions: draped.positions.iter().map(upright).collect(),
