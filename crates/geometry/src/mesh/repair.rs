@@ -223,10 +223,9 @@ fn without_fins(
     let kept: Vec<bool> = component.iter().map(|&c| !fin[c as usize]).collect();
     set_aside.fins = kept.iter().filter(|kept| !**kept).count();
     let mut number = vec![0; kept.len()];
-    let mut next = 0;
-    for (number, _) in number.iter_mut().zip(&kept).filter(|(_, kept)| **kept) {
+    let kept_numbers = number.iter_mut().zip(&kept).filter(|(_, kept)| **kept);
+    for (next, (number, _)) in (0..).zip(kept_numbers) {
         *number = next;
-        next += 1;
     }
     let renumbered = |h: HalfEdgeId| FaceId(number[h.face().index()]).half_edges()[h.corner()];
     let is_kept = |h: &HalfEdgeId| kept[h.face().index()];
