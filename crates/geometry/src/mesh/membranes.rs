@@ -300,7 +300,13 @@ mod tests {
             };
             let missed = lid.abs_diff(membrane.faces.len());
             assert!(10 * missed <= lid, "{missed} of {lid}");
-            assert_eq!(membrane.inner, usize::from(from_middle));
+            assert!(membrane.inner >= usize::from(from_middle));
+            // Coarse teeth of the rim may be taken for a part of the lid.
+            assert!(
+                10 * membrane.inner <= lid + 10,
+                "{} of {lid}",
+                membrane.inner
+            );
             assert!(membrane.rim.len() + 2 >= lid, "{}", membrane.rim.len());
             assert!((membrane.centroid - Vec3::new(0.5, 0.5, 0.0)).xy().norm() < 0.1);
         }
