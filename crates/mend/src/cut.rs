@@ -290,6 +290,9 @@ impl NearLoop {
 
 /// The loops of the rest at their ids, and these in the order that the loops have there. A loop keeps the lowest id of
 /// those that it runs along, then of those that its pieces lay at; new ones are numbered on. A loop of the whole scan
+/// The old ids that a new loop may take.
+type Candidates<'a> = &'a dyn Fn(&NearLoop) -> BTreeSet<u32>;
+
 /// whose id nobody keeps stays as an outer boundary without vertices.
 pub fn renumbered(
     rest: &WeldedScan,
@@ -307,8 +310,7 @@ pub fn renumbered(
         true => near.old.clone(),
         false => BTreeSet::new(),
     };
-    let steps: [&dyn Fn(&NearLoop) -> BTreeSet<u32>; 3] =
-        [&untouched, &|near: &NearLoop| near.old.clone(), &beside];
+    let steps: [Candidates; 3] = [&untouched, &|near: &NearLoop| near.old.clone(), &beside];
     for candidates in steps {
         for (id, near) in ids.iter_mut().zip(around) {
             if id.is_none() {
