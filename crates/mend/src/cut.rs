@@ -288,11 +288,11 @@ impl NearLoop {
     }
 }
 
-/// The loops of the rest at their ids, and these in the order that the loops have there. A loop keeps the lowest id of
-/// those that it runs along, then of those that its pieces lay at; new ones are numbered on. A loop of the whole scan
 /// The old ids that a new loop may take.
 type Candidates<'a> = &'a dyn Fn(&NearLoop) -> BTreeSet<u32>;
 
+/// The loops of the rest at their ids, and these in the order that the loops have there. A loop keeps the lowest id of
+/// those that it runs along, then of those that its pieces lay at; new ones are numbered on. A loop of the whole scan
 /// whose id nobody keeps stays as an outer boundary without vertices.
 pub fn renumbered(
     rest: &WeldedScan,
