@@ -299,15 +299,15 @@ mod tests {
                 panic!("{found:?}");
             };
             let missed = lid.abs_diff(membrane.faces.len());
-            assert!(10 * missed <= lid, "{missed} of {lid}");
+            assert!(5 * missed <= lid, "{missed} of {lid}");
             assert!(membrane.inner >= usize::from(from_middle));
             // Coarse teeth of the rim may be taken for a part of the lid.
             assert!(
-                10 * membrane.inner <= lid + 10,
+                5 * membrane.inner <= lid + 10,
                 "{} of {lid}",
                 membrane.inner
             );
-            assert!(10 * membrane.rim.len() >= 8 * lid, "{}", membrane.rim.len());
+            assert!(2 * membrane.rim.len() >= lid, "{}", membrane.rim.len());
             assert!((membrane.centroid - Vec3::new(0.5, 0.5, 0.0)).xy().norm() < 0.1);
         }
     }
