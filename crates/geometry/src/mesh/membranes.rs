@@ -298,16 +298,19 @@ mod tests {
             let [membrane] = &found[..] else {
                 panic!("{found:?}");
             };
-            let missed = lid.abs_diff(membrane.faces.len());
-            assert!(5 * missed <= lid, "{missed} of {lid}");
-            assert!(membrane.inner >= usize::from(from_middle));
-            // Coarse teeth of the rim may be taken for a part of the lid.
-            assert!(
-                5 * membrane.inner <= lid + 10,
-                "{} of {lid}",
-                membrane.inner
-            );
-            assert!(2 * membrane.rim.len() >= lid, "{}", membrane.rim.len());
+            let first = mesh.faces.len() - lid;
+            let (of_lid, teeth): (Vec<FaceId>, Vec<FaceId>) =
+                membrane.faces.iter().partition(|f| f.index() >= first);
+            let missed = lid - of_lid.len();
+            assert!(missed <= 2, "{missed} of {lid}");
+            // A tooth of the cloth lies between neighbours of the rim, as a mesher's triangle does.
+            let rim: BTreeSet<u32> = mesh.faces[first..].iter().flatten().copied().collect();
+            for tooth in &teeth {
+                assert!(mesh.faces[tooth.index()].iter().all(|v| rim.contains(v)));
+            }
+            assert_eq!(membrane.inner, usize::from(from_middle) + teeth.len());
+            let around = rim.len() - usize::from(from_middle);
+            assert_eq!(membrane.rim.len() + teeth.len() + missed, around);
             assert!((membrane.centroid - Vec3::new(0.5, 0.5, 0.0)).xy().norm() < 0.1);
         }
     }
