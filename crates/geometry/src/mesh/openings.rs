@@ -11,6 +11,7 @@ use super::TriMesh;
 use super::curvature::face_areas;
 use super::loops::{BoundaryLoop, LoopKind};
 use super::topology::Topology;
+use super::turning::vertex_turnings;
 
 /// Logarithm of the odds that a loop is an opening before anything is known about it: most loops that cloth surrounds are
 /// damage.
@@ -137,15 +138,16 @@ impl Verdict {
     }
 }
 
+impl Rim {
+    /// Whether it is as smooth as a finished edge.
+    fn is_hem(&self) -> bool {
+        self.roughness < SMOOTH && self.corners <= HEM_CORNERS
+    }
+}
+
 /// How the turning of a rim is spread over its vertices. Turning is measured on the surface, so that folds do not count.
 fn rim(mesh: &TriMesh, topology: &Topology, l: &BoundaryLoop) -> Rim {
-    let turnings: Vec<f64> = (l.half_edges.iter())
-        .map(|&h| {
-            let fan = topology.twins().fan_after(h);
-            let angles = fan.map(|e| mesh.corner_angle(e.face().index(), e.corner()));
-            PI - angles.sum::<f64>()
-        })
-        .collect();
+    let turnings: Vec<f64> = vertex_turnings(mesh, topology, &l.half_edges).collect();
     let count = turnings.len().max(1) as f64;
     let mean = turnings.iter().sum::<f64>() / count;
     let deviations = || turnings.iter().map(|t| (t - mean).abs());
@@ -170,13 +172,10 @@ struct Piece<'a> {
 
 impl<'a> Piece<'a> {
     fn new(loops: &'a [BoundaryLoop], rims: &'a [Rim], members: &[usize], area: f64) -> Piece<'a> {
-        let is_hem = |k: &&usize| {
-            let smooth = rims[**k].roughness < SMOOTH && rims[**k].corners <= HEM_CORNERS;
-            match loops[**k].kind {
-                LoopKind::TubeEnd => true,
-                LoopKind::Hole | LoopKind::Opening => smooth,
-                LoopKind::Outer => false,
-            }
+        let is_hem = |k: &&usize| match loops[**k].kind {
+            LoopKind::TubeEnd => true,
+            LoopKind::Hole | LoopKind::Opening => rims[**k].is_hem(),
+            LoopKind::Outer => false,
         };
         let mut hems: Vec<f64> = (members.iter().filter(is_hem))
             .map(|k| loops[*k].length)
@@ -196,7 +195,7 @@ impl<'a> Piece<'a> {
     fn evidence(&self, k: usize) -> Vec<Evidence> {
         let (l, rim) = (&self.loops[k], self.rims[k]);
         let smoothness = (2.0 * (TORN - rim.roughness) / (TORN - SMOOTH) - 1.0).clamp(-1.0, 1.0);
-        let is_hem = rim.roughness < SMOOTH && rim.corners <= HEM_CORNERS;
+        let is_hem = rim.is_hem();
         let size = l.length / self.size.max(f64::MIN_POSITIVE);
         // The rim of a missing triangle is as smooth as a rim of three edges can be.
         let told =

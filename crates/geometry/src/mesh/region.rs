@@ -113,14 +113,8 @@ pub fn grow(
     budget: &Budget,
 ) -> Result<Region, RegionError> {
     let mesh = whole.mesh;
-    let Some(asked) = whole.loops.get(rim.index()) else {
-        return Err(RegionError::NoSuchLoop {
-            rim,
-            loops: whole.loops.len(),
-        });
-    };
-    small_enough(mesh, asked, &asked.vertices)?;
-    let growth = Growth::new(*whole, asked, reach, budget)?;
+    let growth = growth_from(whole, rim, reach, budget)?;
+    let asked = growth.rim;
     let narrowest = growth.narrowest;
     let farthest = growth
         .distance
@@ -167,14 +161,8 @@ pub fn grow_cut_open(
     reach: f64,
     budget: &Budget,
 ) -> Result<Option<Region>, RegionError> {
-    let Some(asked) = whole.loops.get(rim.index()) else {
-        return Err(RegionError::NoSuchLoop {
-            rim,
-            loops: whole.loops.len(),
-        });
-    };
-    small_enough(whole.mesh, asked, &asked.vertices)?;
-    let growth = Growth::new(*whole, asked, reach, budget)?;
+    let growth = growth_from(whole, rim, reach, budget)?;
+    let asked = growth.rim;
     let reach = reach.max(growth.narrowest);
     let inside = growth.inside(reach, budget)?;
     let mut cut = CutEdges::new();
@@ -208,14 +196,8 @@ pub fn collar(
     reach: f64,
     budget: &Budget,
 ) -> Result<Region, RegionError> {
-    let Some(asked) = whole.loops.get(rim.index()) else {
-        return Err(RegionError::NoSuchLoop {
-            rim,
-            loops: whole.loops.len(),
-        });
-    };
-    small_enough(whole.mesh, asked, &asked.vertices)?;
-    let growth = Growth::new(*whole, asked, reach, budget)?;
+    let growth = growth_from(whole, rim, reach, budget)?;
+    let asked = growth.rim;
     let reach = reach.max(growth.narrowest);
     let inside = growth.inside(reach, budget)?;
     let piece = Piece::new(&growth, &inside, &CutEdges::new(), reach);
@@ -225,6 +207,26 @@ pub fn collar(
     };
     small_enough(whole.mesh, asked, &region.vertices)?;
     Ok(region)
+}
+
+/// The cloth by its distance from loop `rim`, up to `reach`, scene units.
+///
+/// # Errors
+/// When the rim does not exist or one of its coordinates exceeds 10¹⁰⁰; `Exhausted`.
+fn growth_from<'a>(
+    whole: &BoundedMesh<'a>,
+    rim: LoopId,
+    reach: f64,
+    budget: &Budget,
+) -> Result<Growth<'a>, RegionError> {
+    let Some(asked) = whole.loops.get(rim.index()) else {
+        return Err(RegionError::NoSuchLoop {
+            rim,
+            loops: whole.loops.len(),
+        });
+    };
+    small_enough(whole.mesh, asked, &asked.vertices)?;
+    Ok(Growth::new(*whole, asked, reach, budget)?)
 }
 
 fn small_enough(

@@ -40,16 +40,23 @@ const NO_LOOP: LoopId = LoopId(u32::MAX);
 /// assert!((turnings[1] + TAU).abs() < 1e-9, "the hole");
 /// ```
 pub fn turning(mesh: &TriMesh, topology: &Topology, half_edges: &[HalfEdgeId]) -> f64 {
-    half_edges
-        .iter()
-        .map(|&h| {
-            let fan = topology.twins().fan_after(h);
-            let angles: f64 = fan
-                .map(|e| mesh.corner_angle(e.face().index(), e.corner()))
-                .sum();
-            PI - angles
-        })
-        .sum()
+    vertex_turnings(mesh, topology, half_edges).sum()
+}
+
+/// Geodesic curvature of a boundary loop at each of its vertices, radians: π − θᵥ, θᵥ the interior angle of the faces
+/// at v.
+pub(super) fn vertex_turnings(
+    mesh: &TriMesh,
+    topology: &Topology,
+    half_edges: &[HalfEdgeId],
+) -> impl Iterator<Item = f64> {
+    half_edges.iter().map(|&h| {
+        let fan = topology.twins().fan_after(h);
+        let angles: f64 = fan
+            .map(|e| mesh.corner_angle(e.face().index(), e.corner()))
+            .sum();
+        PI - angles
+    })
 }
 
 /// A vertex some rings away from the boundary, and the loop it is nearest to: [`NO_LOOP`] when two are as near.
