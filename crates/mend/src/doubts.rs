@@ -5,7 +5,7 @@ use crate::fill_hole::PatchDraft;
 use crate::hole_report::patch_report;
 use darn_contract::v1;
 use darn_geometry::patch::Patch;
-use darn_geometry::patch::quality::{self, Quality};
+use darn_geometry::patch::quality;
 
 /// Length of an edge over its length in the chart from which on it is absurd, if it is also longer by more than the mean edge of the rim: noise makes
 /// short edges twice as long. Cloth strains by a few per cent; on 115 holes with known answers, noise up to 0.2 of an edge, one patch of cloth with noise
@@ -18,7 +18,7 @@ const MOST_CUTS: f64 = 0.1;
 const FEW_CUTS: usize = 8;
 
 /// The reasons why a patch is no plausible cloth, each with its numbers; none for a sound patch.
-pub fn doubts(patch: &Patch, quality: &Quality) -> Vec<String> {
+pub fn doubts(patch: &Patch) -> Vec<String> {
     let mut doubts = Vec::new();
     let stretch = largest_stretch(patch);
     if stretch > MOST_STRETCH {
@@ -26,7 +26,7 @@ pub fn doubts(patch: &Patch, quality: &Quality) -> Vec<String> {
             "an edge is stretched {stretch:.2} times (limit {MOST_STRETCH})"
         ));
     }
-    let (cuts, faces) = (quality.self_intersections, patch.faces.len());
+    let (cuts, faces) = (patch.crossings, patch.faces.len());
     if cuts > FEW_CUTS && cuts as f64 > MOST_CUTS * faces as f64 {
         let share = 100.0 * cuts as f64 / faces.max(1) as f64;
         let limit = 100.0 * MOST_CUTS;
@@ -73,12 +73,13 @@ impl PatchDraft<'_> {
         if self.edited {
             return Vec::new();
         }
-        doubts(&self.patch, &self.quality())
+        doubts(&self.patch)
     }
 
     /// The error of a draft that is not applied.
     pub fn left(&self, doubts: Vec<String>) -> MendError {
-        let measured = patch_report(self.hole, &self.patch, &self.quality());
+        let quality = quality::measure(&self.patch, self.hole.region());
+        let measured = patch_report(self.hole, &self.patch, &quality);
         MendError::NoPlausibleFill {
             hole: self.hole.id(),
             doubts,
@@ -87,9 +88,5 @@ impl PatchDraft<'_> {
                 ..measured
             }),
         }
-    }
-
-    fn quality(&self) -> Quality {
-        quality::measure(&self.patch, self.hole.region())
     }
 }
