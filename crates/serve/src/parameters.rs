@@ -126,33 +126,18 @@ pub fn holes_query(query: Option<&str>) -> Result<HolesQuery, RequestError> {
 /// # Errors
 /// `Invalid`, naming the fields that select holes or weights.
 pub fn only_edits(constraints: Constraints) -> Result<Constraints, RequestError> {
-    let mut unexpected = Vec::new();
-    if !constraints.holes.is_empty() {
-        unexpected.push("/holes");
-    }
-    if constraints.weights.is_some() {
-        unexpected.push("/weights");
-    }
-    if constraints.up.is_some() {
-        unexpected.push("/up");
-    }
-    if constraints.fill.is_some() {
-        unexpected.push("/fill");
-    }
-    if constraints.diameters.max.is_some() {
-        unexpected.push("/maxDiameter");
-    }
-    if constraints.diameters.min.is_some() {
-        unexpected.push("/minDiameter");
-    }
-    if !constraints.except.is_empty() {
-        unexpected.push("/except");
-    }
-    if constraints.accept_doubtful {
-        unexpected.push("/acceptDoubtful");
-    }
+    let given = [
+        ("/holes", !constraints.holes.is_empty()),
+        ("/weights", constraints.weights.is_some()),
+        ("/up", constraints.up.is_some()),
+        ("/fill", constraints.fill.is_some()),
+        ("/maxDiameter", constraints.diameters.max.is_some()),
+        ("/minDiameter", constraints.diameters.min.is_some()),
+        ("/except", !constraints.except.is_empty()),
+        ("/acceptDoubtful", constraints.accept_doubtful),
+    ];
     let detail = "chosen when the session was opened; open another for another choice";
-    refuse_fields(&unexpected, detail).map(|()| constraints)
+    refuse_fields(&given, detail).map(|()| constraints)
 }
 
 /// Allows only constraints that select holes and weights: those that open a session.
@@ -160,21 +145,22 @@ pub fn only_edits(constraints: Constraints) -> Result<Constraints, RequestError>
 /// # Errors
 /// `Invalid`, naming the fields that deform cloth.
 pub fn only_selection(constraints: Constraints) -> Result<Constraints, RequestError> {
-    let mut unexpected = Vec::new();
-    if !constraints.anchors.is_empty() {
-        unexpected.push("/anchors");
-    }
-    if !constraints.edits.is_empty() {
-        unexpected.push("/edits");
-    }
+    let given = [
+        ("/anchors", !constraints.anchors.is_empty()),
+        ("/edits", !constraints.edits.is_empty()),
+    ];
     let detail = "not taken when a session is opened; send it to /sessions/{id}/inpaint";
-    refuse_fields(&unexpected, detail).map(|()| constraints)
+    refuse_fields(&given, detail).map(|()| constraints)
 }
 
-fn refuse_fields(pointers: &[&str], detail: &str) -> Result<(), RequestError> {
-    if pointers.is_empty() {
+/// Refuses the fields, by pointer, that were given.
+fn refuse_fields(given: &[(&str, bool)], detail: &str) -> Result<(), RequestError> {
+    let unexpected = given.iter().filter(|(_, is_given)| *is_given);
+    let fields: Vec<FieldError> = unexpected
+        .map(|(pointer, _)| FieldError::new(*pointer, detail))
+        .collect();
+    if fields.is_empty() {
         return Ok(());
     }
-    let fields = pointers.iter().map(|at| FieldError::new(*at, detail));
-    Err(Constraints::invalid(fields.collect()))
+    Err(Constraints::invalid(fields))
 }
