@@ -74,9 +74,14 @@ impl Selection {
         let mut wrong = Vec::new();
         let mut requests = Requests::default();
         let except = exceptions(welded, constraints, &mut wrong);
-        let reason = |rim| reason_to_skip(scan, welded, constraints, &except, rim);
-        for rim in welded.loops.iter().filter(|rim| reason(rim).is_none()) {
-            requests.add(rim.id.0);
+        let mut skipped = Vec::new();
+        for rim in &welded.loops {
+            match reason_to_skip(scan, welded, constraints, &except, rim) {
+                Some(reason) => skipped.push(reason.entry(rim)),
+                None => {
+                    requests.add(rim.id.0);
+                }
+            }
         }
         for (i, selector) in constraints.holes.iter().enumerate() {
             let rim = match selector {
@@ -102,10 +107,7 @@ impl Selection {
         if let Some(hole) = named.find(|r| welded.loops[r.id as usize].non_manifold) {
             return Err(MendError::NonManifold { hole: hole.id });
         }
-        let left = |rim: &&BoundaryLoop| !requests.0.contains_key(&rim.id.0);
-        let skipped: Vec<v1::Skipped> = (welded.loops.iter().filter(left))
-            .map(|rim| skipped(rim, reason(rim)))
-            .collect();
+        skipped.retain(|s| !requests.0.contains_key(&s.id));
         if requests.0.is_empty() {
             return Err(MendError::NoHoles { skipped });
         }
@@ -260,6 +262,17 @@ impl SkipReason {
         let phrase = phrase.into();
         Some(SkipReason { code, phrase })
     }
+
+    /// The entry of a loop that is left for this reason.
+    fn entry(self, rim: &BoundaryLoop) -> v1::Skipped {
+        v1::Skipped {
+            id: rim.id.0,
+            kind: kind(rim.kind) as i32,
+            code: self.code.to_owned(),
+            reason: self.phrase,
+            patch: None,
+        }
+    }
 }
 
 /// Why a loop is left as it is when no selector names it; `None` for one that the request fills.
@@ -336,23 +349,6 @@ pub fn skipped_for(error: &MendError, rim: &BoundaryLoop) -> v1::Skipped {
         code: error.code().word.to_owned(),
         reason: error_chain(error),
         patch,
-    }
-}
-
-fn skipped(rim: &BoundaryLoop, reason: Option<SkipReason>) -> v1::Skipped {
-    let (code, phrase) = match reason {
-        Some(reason) => (reason.code, reason.phrase),
-        None => (
-            "not_selected",
-            "a hole that the request did not choose".to_owned(),
-        ),
-    };
-    v1::Skipped {
-        id: rim.id.0,
-        kind: kind(rim.kind) as i32,
-        code: code.to_owned(),
-        reason: phrase,
-        patch: None,
     }
 }
 
