@@ -66,15 +66,12 @@ pub fn chosen(
         }
         Cut::Rims(ids) => {
             for (k, id) in ids.iter().enumerate() {
-                let detail = match whole.loops.get(*id as usize) {
-                    Some(rim) if rim.kind == LoopKind::Outer => {
+                let detail = match whole.loop_with_id(*id) {
+                    Ok(rim) if rim.kind == LoopKind::Outer => {
                         format!("loop {id} is the cloth's own edge, not the rim of a hole")
                     }
-                    Some(_) => continue,
-                    None => format!(
-                        "there is no loop {id}; the scan has {} boundary loop(s), numbered from 0",
-                        whole.loops.len()
-                    ),
+                    Ok(_) => continue,
+                    Err(detail) => detail,
                 };
                 return Ok(Err((format!("/loops/{k}"), detail)));
             }

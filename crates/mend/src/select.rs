@@ -91,7 +91,7 @@ impl Selection {
                     }
                     continue;
                 }
-                HoleSelector::Id(id) => with_id(welded, *id),
+                HoleSelector::Id(id) => welded.loop_with_id(*id),
                 HoleSelector::Near(point) => near.to(&Vec3::from(*point))?,
             };
             match rim.and_then(|rim| nameable(scan, welded, &except, rim)) {
@@ -204,21 +204,11 @@ fn exceptions(
     wrong: &mut Vec<FieldError>,
 ) -> BTreeSet<u32> {
     for (i, id) in constraints.except.iter().enumerate() {
-        if let Err(detail) = with_id(welded, *id) {
+        if let Err(detail) = welded.loop_with_id(*id) {
             wrong.push(FieldError::new(format!("/except/{i}"), detail));
         }
     }
     constraints.except.iter().copied().collect()
-}
-
-/// The loop with an id, or why there is none.
-fn with_id(welded: &WeldedScan, id: u32) -> Result<&BoundaryLoop, String> {
-    welded.loops.get(id as usize).ok_or_else(|| {
-        format!(
-            "there is no loop {id}; the scan has {} boundary loop(s), numbered from 0",
-            welded.loops.len()
-        )
-    })
 }
 
 /// The id of a named loop, whatever its kind; or why it may not be filled.

@@ -150,6 +150,16 @@ impl WeldedScan {
         skins.any(|skin| skin.first == hole && skin.is_back)
     }
 
+    /// The loop with an id, or why there is none.
+    pub fn loop_with_id(&self, id: u32) -> Result<&BoundaryLoop, String> {
+        self.loops.get(id as usize).ok_or_else(|| {
+            format!(
+                "there is no loop {id}; the scan has {} boundary loop(s), numbered from 0",
+                self.loops.len()
+            )
+        })
+    }
+
     /// A loop in the contract's words.
     pub fn loop_report(&self, rim: &BoundaryLoop, scan: &Scan) -> v1::Loop {
         let part = rim

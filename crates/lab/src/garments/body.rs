@@ -1,6 +1,6 @@
 //! Bodies: tapered capsules that grow from nothing inside the flat garment and then move into their pose.
 
-use super::contacts::friction_share;
+use crate::scarffolds::contacts::friction_share;
 use crate::scarffolds::lattice::Vec3f;
 
 /// A tapered capsule: all points within a radius of a segment, the radius going linearly from end to end.

@@ -3,6 +3,7 @@
 //! As in `scarffolds::contacts`, pairs are searched once in a few steps, with a margin, and listed in a fixed order; here the cloth is any
 //! triangle mesh, so "near along the cloth" is two edges.
 
+use crate::scarffolds::contacts::friction_share;
 use crate::scarffolds::lattice::Vec3f;
 
 /// Near pairs of vertices, kept between two searches.
@@ -110,15 +111,5 @@ impl MeshContacts {
             positions[a] -= push * wa;
             positions[b] += push * wb;
         }
-    }
-}
-
-/// The share of a slide that friction takes back, when it may take back `most` metres.
-pub(super) fn friction_share(slide: &Vec3f, most: f32) -> f32 {
-    let far = slide.norm();
-    if far > 1.0e-9 {
-        (most / far).min(1.0)
-    } else {
-        0.0
     }
 }

@@ -113,7 +113,7 @@ impl SelfContacts {
 }
 
 /// The share of a slide that friction takes back, when it may take back `most` metres.
-pub(super) fn friction_share(slide: &Vec3f, most: f32) -> f32 {
+pub(crate) fn friction_share(slide: &Vec3f, most: f32) -> f32 {
     let far = slide.norm_squared().sqrt();
     if far > 1.0e-9 {
         (most / far).min(1.0)

@@ -4,7 +4,7 @@
 //! (a [`scene`] moved by an XPBD solver), [`samples::Sampler`] cuts training samples from sheets, and [`holed_scan::holed_scan`] meshes a
 //! sheet like a scan. This module knows no network, no loss and no training loop.
 
-mod contacts;
+pub(crate) mod contacts;
 pub mod error;
 pub mod export;
 pub mod fabric;
