@@ -2,7 +2,8 @@
 
 use crate::error::MendError;
 use crate::mender::Call;
-use crate::prepare::{Denoise, FlatRegion, SampledGrid};
+use crate::prepare::{Denoise, FlatRegion};
+use crate::sampled_grid::SampledGrid;
 use darn_geometry::flatten::{self, FlattenError};
 use darn_geometry::mesh::Vec3;
 use darn_geometry::mesh::index::LoopId;

@@ -43,6 +43,7 @@ mod picture;
 mod port;
 mod prepare;
 mod prepared_hole;
+mod sampled_grid;
 mod scan_holes;
 mod scan_notes;
 mod select;

@@ -1,29 +1,29 @@
-//! Prepares a hole: grows the region of cloth around it, lays the region flat, samples the grid and plans the patch.
+//! Prepares a hole: grows the region of cloth around it, lays the region flat and plans the patch.
 
 use std::cell::Cell;
 use std::time::Instant;
 
-use crate::edit::{HoleCells, ReachLimit, RimPoint};
+use crate::edit::{ReachLimit, RimPoint};
 use crate::error::MendError;
 use crate::hole::{Hole, UneditedCloths};
 use crate::islands::Islands;
 use crate::mender::Call;
+use crate::sampled_grid::SampledGrid;
 use crate::timings::milliseconds;
 use crate::welded_scan::WeldedScan;
 use darn_budget::{Budget, Exhausted};
 use darn_contract::v1;
 use darn_geometry::flatten::{self, Chart, FlattenError};
-use darn_geometry::grid::{self, CELLS, Grid, Normalisation};
 use darn_geometry::mesh::denoise::denoise;
 use darn_geometry::mesh::index::{FaceId, LoopId};
 use darn_geometry::mesh::layers::layers_near;
 use darn_geometry::mesh::region::{self, BoundedMesh, Region, RegionError};
 use darn_geometry::mesh::sound_hole::SoundHole;
 use darn_geometry::mesh::spikes::spikes;
-use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
+use darn_geometry::mesh::{TriMesh, Vec2};
 use darn_geometry::misfit::{flaps, overlapping_lip};
-use darn_geometry::patch::{self, PatchError, PatchMesh, PatchMetric};
-use darn_geometry::polygon::{extent, inside};
+use darn_geometry::patch::{PatchError, PatchMesh};
+use darn_geometry::polygon::extent;
 
 /// Share of the grid's side that the hole should take, so that hole and context share the grid as in training.
 const HOLE_SHARE: f64 = 0.5;
@@ -40,8 +40,6 @@ const TUBE_STRETCH: f64 = 1.05;
 const MAX_TRIES: usize = 4;
 /// Tries with more and more of the cloth at the rim left out.
 const MISFIT_SEARCHES: usize = 4;
-/// Nanoseconds of work of a grid and its plates.
-const GRID_WORK: u64 = 9_000_000;
 /// Nanoseconds of work a face of the scan in the search for other layers near a hole.
 const LAYERS_WORK: u64 = 10;
 
@@ -203,19 +201,6 @@ struct TimedMesh {
     milliseconds: f64,
 }
 
-/// The grid of a hole and what is computed from it.
-pub struct SampledGrid {
-    grid: Grid,
-    /// Converts between scene space and the network's units.
-    pub normal: Normalisation,
-    /// The grid's cells that lie in the hole.
-    pub cells: HoleCells,
-    /// A smooth fill of the grid, network's units.
-    pub base: Option<Vec<[f32; 3]>>,
-    metric: Option<PatchMetric>,
-    milliseconds: f64,
-}
-
 impl Preparation<'_> {
     /// The hole, with a region of this reach or a smaller one; the reach is in scene units.
     fn hole(&self, widest: f64) -> Result<Prepared, MendError> {
@@ -333,7 +318,7 @@ impl Preparation<'_> {
     fn sampled(&self, flat: FlatRegion) -> Result<Hole, MendError> {
         let (cloth, id, call) = (self.cloth, self.id, self.call);
         let (sampled, mesh) = rayon::join(
-            || sample(id, &flat, call.budget),
+            || SampledGrid::of(id, &flat, call.budget),
             || cloth.triangulated(id, &flat, call),
         );
         let (sampled, mesh) = (sampled?, mesh?);
@@ -347,7 +332,7 @@ impl Preparation<'_> {
             return self.planned(flat, sampled, mesh);
         };
         match (
-            sample(id, &joined, call.budget),
+            SampledGrid::of(id, &joined, call.budget),
             cloth.triangulated(id, &joined, call),
         ) {
             (Ok(sampled), Ok(mesh)) => self.planned(joined, sampled, mesh),
@@ -363,26 +348,25 @@ impl Preparation<'_> {
         &self,
         flat: FlatRegion,
         sampled: SampledGrid,
-        TimedMesh {
-            mesh,
-            milliseconds: triangulate_ms,
-        }: TimedMesh,
+        triangles: TimedMesh,
     ) -> Result<Hole, MendError> {
         let (id, scan, call) = (self.id, self.cloth.whole.mesh, self.call);
         let seen = flat.seen();
         let rim_uv = flat.rim_uv();
         let started = Instant::now();
-        let plan = (mesh.plan(seen, &flat.chart, sampled.metric.as_ref(), call))
-            .and_then(|plan| match &flat.smooth {
-                Some(_) => plan.with_region_at(&flat.region.mesh.positions),
-                None => Ok(plan),
-            })
-            .map_err(MendError::patch(id))?;
+        let plan = (triangles
+            .mesh
+            .plan(seen, &flat.chart, sampled.metric.as_ref(), call))
+        .and_then(|plan| match &flat.smooth {
+            Some(_) => plan.with_region_at(&flat.region.mesh.positions),
+            None => Ok(plan),
+        })
+        .map_err(MendError::patch(id))?;
         // The largest distance that cloth of the hole's extent can have from its rim.
         let beyond = 0.5 * extent(&rim_uv) * flat.chart.frame.side;
         call.budget.spend(LAYERS_WORK * scan.faces.len() as u64)?;
         let plan = plan.with_layers(&layers_near(scan, &flat.region, beyond, self.cloth.left));
-        let patch = triangulate_ms + milliseconds(started);
+        let patch = triangles.milliseconds + milliseconds(started);
         let timings = v1::HoleTimings {
             raster: sampled.milliseconds,
             patch,
@@ -404,7 +388,7 @@ impl Preparation<'_> {
             id,
             left_faces: self.cloth.left.len(),
             plan,
-            report: grid_report(&sampled, &rim_uv),
+            report: sampled.report(&rim_uv),
             grid: sampled.grid,
             normal: sampled.normal,
             cells: sampled.cells,
@@ -428,56 +412,9 @@ impl FlatRegion {
     }
 
     /// The rim on the chart's unit square.
-    fn rim_uv(&self) -> Vec<Vec2> {
-        rim_uv(&self.region, &self.chart)
-    }
-}
-
-fn rim_uv(region: &Region, chart: &Chart) -> Vec<Vec2> {
-    region.rim.iter().map(|v| chart.uv(*v)).collect()
-}
-
-/// Samples the grid, and continues positions and metric into its unknown cells.
-fn sample(id: u32, flat: &FlatRegion, budget: &Budget) -> Result<SampledGrid, MendError> {
-    let started = Instant::now();
-    let (seen, chart) = (flat.seen(), &flat.chart);
-    let rim_uv = rim_uv(seen, chart);
-    budget.spend(GRID_WORK)?;
-    let grid = flatten::raster(&seen.mesh, chart);
-    let normal = grid.normalisation().ok_or(MendError::TooLittleKnown {
-        hole: id,
-        known: grid.known_count(),
-    })?;
-    let cells = HoleCells::new(|k| !grid.known[k] && inside(&rim_uv, grid::cell_centre(k)));
-    let strained = patch::log_stretch(seen, chart);
-    let strained: Vec<[f32; 3]> = strained.iter().map(|s| s.cast::<f32>().into()).collect();
-    let sheets = [&grid.normalised(&normal).positions[..], &strained];
-    let mut filled = darn_net::plates(&sheets, &grid.known).unwrap_or_default();
-    let metric = (filled.len() == sheets.len())
-        .then(|| filled.pop())
-        .flatten();
-    let metric = metric.map(|cells| {
-        let wide = cells.iter().map(|s| Vec3::from(s.map(f64::from)));
-        PatchMetric::of_log_stretch(wide.collect())
-    });
-    Ok(SampledGrid {
-        grid,
-        normal,
-        cells,
-        base: filled.pop(),
-        metric,
-        milliseconds: milliseconds(started),
-    })
-}
-
-fn grid_report(sampled: &SampledGrid, rim_uv: &[Vec2]) -> v1::GridReport {
-    let SampledGrid { grid, normal, .. } = sampled;
-    let spacing = grid::spacing(&grid.positions, |a, b| grid.known[a] && grid.known[b]);
-    v1::GridReport {
-        spacing_mean: normal.scale / grid::SIDE as f64,
-        spacing_variance: spacing.variance / (spacing.mean * spacing.mean),
-        known: grid.known_count() as f64 / CELLS as f64,
-        hole: patch::signed_area(rim_uv).abs(),
+    pub fn rim_uv(&self) -> Vec<Vec2> {
+        let rim = self.region.rim.iter();
+        rim.map(|v| self.chart.uv(*v)).collect()
     }
 }
 
@@ -520,6 +457,7 @@ fn rim_crosses(error: &MendError) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use darn_geometry::mesh::Vec3;
     use darn_geometry::mesh::shapes::{jitter, sheet};
 
     #[test]
