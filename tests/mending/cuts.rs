@@ -1,5 +1,10 @@
 //! Damaged cloth that is cut out before its hole is filled.
 
+use std::collections::HashSet;
+use std::sync::Arc;
+
+use super::cloth::{MendedScan, ROUND, holed, laid, mended, mender, packed, read, sheet};
+use darn_budget::Budget;
 use darn_contract::port::HolesQuery;
 use darn_contract::{Anchor, Constraints, Cut, HoleSelector};
 use darn_geometry::mesh::curvature::face_areas;
@@ -11,11 +16,6 @@ use darn_geometry::mesh::weld::weld;
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
 use darn_lab::scarffolds::holed_scan::HoleShape;
 use darn_mend::{ScanSession, find_holes};
-use std::sync::Arc;
-
-use darn_budget::Budget;
-
-use super::cloth::{MendedScan, ROUND, holed, laid, mended, mender, packed, read, sheet};
 
 fn asking(cuts: Vec<Cut>) -> Constraints {
     Constraints {
@@ -91,10 +91,15 @@ fn a_ball_of_cloth_is_cut_out_and_mended() {
         assert!(after.topology.non_manifold.is_empty());
         let kept = after.welded.mesh.faces.len() - after.patch.len();
         assert_eq!(kept + cut.faces as usize, mesh.faces.len());
-        // The layer that the ball's centre lies in is gone; other layers of the fold stay.
-        for f in (0..after.welded.mesh.faces.len()).filter(|f| !after.patch.contains(f)) {
+        // What is left of the cloth that was cut does not reach into the ball; other layers of the fold may.
+        let faces = &after.welded.mesh.faces;
+        let of_patch = after.patch.iter().flat_map(|f| faces[*f]);
+        let of_patch: HashSet<u32> = of_patch.collect();
+        let beside = |f: &usize| faces[*f].iter().any(|v| of_patch.contains(v));
+        let kept = (0..faces.len()).filter(|f| !after.patch.contains(f));
+        for f in kept.filter(beside) {
             let corners = after.welded.mesh.triangle(f);
-            assert!(darn_geometry::mesh::cut::distance(&corners, &center) > 0.01 * radius);
+            assert!(darn_geometry::mesh::cut::distance(&corners, &center) >= radius * 0.9999);
         }
         let share = after.patch_area() / cut.area;
         assert!((0.8..1.2).contains(&share), "sheet {k}: area {share}");
@@ -208,6 +213,18 @@ fn ids_are_those_of_the_scan_and_new_holes_are_numbered_on() {
         .collect();
     assert_eq!(ids, [(hole.id, false), (new, true)]);
     assert_eq!(report.holes[1].anchors.len(), 1);
+
+    // A cut over all of the old hole's rim keeps its id.
+    let at = Vec3::from_column_slice(&hole.centroid);
+    let over = ball(at, 0.55 * hole.diameter);
+    let kept = mended(&bytes, &asking(vec![over.clone()])).unwrap().report;
+    assert_eq!(kept.holes[0].id, hole.id);
+
+    // Where an old loop goes, it is accounted for.
+    let both = asking(vec![over, Cut::Rims(vec![hole.id])]);
+    let both = mended(&bytes, &both).unwrap().report;
+    assert_eq!(both.holes.len(), 1);
+    assert_eq!(both.skipped.len(), 1, "{:?}", both.skipped);
 }
 
 #[test]
