@@ -208,7 +208,7 @@ pub fn write(dir: &Path, seed: u64, cases: &[GarmentCase]) -> Result<(), Garment
     std::fs::write(&path, text).map_err(|source| GarmentError::Io { path, source })
 }
 
-/// Reads a set that [`write`] wrote.
+/// Reads a set that [`write()`] wrote.
 ///
 /// # Errors
 /// Files that cannot be read, or have another format.
