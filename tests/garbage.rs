@@ -147,7 +147,7 @@ fn each_kind_of_invalid_scan_has_its_error() {
     let cycle = error_after(|json, _| json["nodes"][1]["children"] = json!([0]));
     assert!(names(&cycle, "/nodes/1/children/0"), "{cycle}");
     let empty = error_after(|json, _| json["scenes"] = json!([{}]));
-    assert!(matches!(empty, ScanError::NoTriangles), "{empty}");
+    assert!(matches!(empty, ScanError::NoTriangles { .. }), "{empty}");
     assert!(matches!(
         read_and_write(b""),
         Err(ScanError::Container { offset: 0, .. })

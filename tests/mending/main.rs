@@ -2,8 +2,11 @@
 
 mod borders;
 mod cloth;
+mod compressed;
 mod cuts;
 mod editing;
+#[path = "../../crates/gltf-scan/src/compressed/encoded.rs"]
+mod encoded;
 mod laws;
 mod ragged;
 mod requests;

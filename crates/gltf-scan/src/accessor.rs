@@ -1,10 +1,11 @@
-//! Reads accessors: all component types, normalized, strided, sparse. Every count is checked against the bytes before
-//! memory is allocated.
+//! Reads accessors: all component types, normalized, strided, sparse, from plain buffer views, compressed ones and Draco
+//! streams. Every count is checked against the bytes before memory is allocated.
 
 use gltf::json::accessor::{BYTE, FLOAT, SHORT, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT};
 use gltf::json::accessor::{ComponentType, Type};
 
 use super::buffers::{BufferView, Document};
+use super::compressed::draco::DracoAttribute;
 use super::error::ScanError;
 use super::json::JsonPlace;
 
@@ -15,8 +16,16 @@ pub(super) struct Accessor<'d> {
     pub kind: Type,
     pub count: usize,
     normalized: bool,
-    base: Option<Elements<'d>>,
+    base: ElementSource<'d>,
     sparse: Option<SparseAccessor<'d>>,
+}
+
+/// Where the elements of an accessor come from.
+enum ElementSource<'d> {
+    /// Nowhere: all are zero, except those that sparse values replace.
+    Zero,
+    View(Elements<'d>),
+    Draco(DracoAttribute<'d>),
 }
 
 /// Elements of `size` bytes, `stride` bytes apart.
@@ -37,15 +46,36 @@ struct SparseAccessor<'d> {
 impl<'d> Accessor<'d> {
     /// Opens the accessor at `place`. Decodes no element and allocates nothing of its size.
     pub fn open<'a>(document: &'d Document<'a>, place: &JsonPlace<'a>) -> Result<Self, ScanError> {
+        Self::open_over(document, place, None)
+    }
+
+    /// [`Accessor::open`], with the elements of a Draco attribute in place of those of its buffer view.
+    pub fn open_over<'a>(
+        document: &'d Document<'a>,
+        place: &JsonPlace<'a>,
+        draco: Option<DracoAttribute<'d>>,
+    ) -> Result<Self, ScanError> {
         let component = component(&place.need("componentType")?)?;
         let kind = kind(&place.need("type")?)?;
-        let count_place = place.need("count")?;
-        let count = count_place.integer()?;
+        let count = match &draco {
+            // The stream knows better than the JSON: viewers take its count too.
+            Some(attribute) => attribute.count(),
+            None => place.need("count")?.integer()?,
+        };
         let size = component.size() * kind.multiplicity();
-        // Without a buffer view all elements are zero, except those that sparse values replace.
-        let base = match place.get("bufferView")? {
-            Some(view) => Some(elements(document.view(&view)?, place, count, size)?),
-            None => None,
+        let base = match (draco, place.get("bufferView")?) {
+            (Some(attribute), _) if attribute.components() != kind.multiplicity() => {
+                return Err(place.invalid(format!(
+                    "has {} numbers an element, its Draco attribute has {}",
+                    kind.multiplicity(),
+                    attribute.components()
+                )));
+            }
+            (Some(attribute), _) => ElementSource::Draco(attribute),
+            (None, Some(view)) => {
+                ElementSource::View(elements(document.view(&view)?, place, count, size)?)
+            }
+            (None, None) => ElementSource::Zero,
         };
         let sparse = match place.get("sparse")? {
             Some(sparse) => Some(open_sparse(document, &sparse, count, size)?),
@@ -108,8 +138,9 @@ impl<'d> Accessor<'d> {
 
     fn collect<T: Copy>(&self, zero: T, read: impl Fn(&[u8]) -> T) -> Result<Vec<T>, ScanError> {
         let mut out = match &self.base {
-            Some(base) => base.iter().take(self.count).map(&read).collect(),
-            None => vec![zero; self.count],
+            ElementSource::View(base) => base.iter().take(self.count).map(&read).collect(),
+            ElementSource::Draco(attribute) => self.collect_draco(attribute, &read)?,
+            ElementSource::Zero => vec![zero; self.count],
         };
         if let Some(sparse) = &self.sparse {
             for (k, (index, value)) in sparse.indices.iter().zip(sparse.values.iter()).enumerate() {
@@ -127,6 +158,28 @@ impl<'d> Accessor<'d> {
             }
         }
         Ok(out)
+    }
+
+    fn collect_draco<T>(
+        &self,
+        attribute: &DracoAttribute<'_>,
+        read: impl Fn(&[u8]) -> T,
+    ) -> Result<Vec<T>, ScanError> {
+        let mut element = [0; 16 * size_of::<f32>()];
+        let size = self.component.size() * self.kind.multiplicity();
+        let element = element.get_mut(..size).unwrap_or_default();
+        let points = 0..self.count;
+        points
+            .map(
+                |point| match attribute.write(point, self.component, element) {
+                    true => Ok(read(element)),
+                    false => Err(ScanError::Invalid {
+                        pointer: self.pointer.clone(),
+                        detail: format!("its Draco attribute has no value for point {point}"),
+                    }),
+                },
+            )
+            .collect()
     }
 }
 

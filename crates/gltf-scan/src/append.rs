@@ -8,6 +8,7 @@ use gltf::json::accessor::{ComponentType, Type};
 use serde_json::{Value, json};
 
 use super::buffers::BufferTarget;
+use super::compressed::meshopt;
 use super::container::{Container, pack_glb};
 use super::error::ScanError;
 use super::json_edit::JsonEdit;
@@ -76,8 +77,15 @@ impl<'s> Appender<'s> {
             .map_or(&[][..], Vec::as_slice);
         let in_bin = scan.layout.container == Container::Glb
             && match buffers.first() {
-                // The BIN chunk is the first buffer's if that has no uri.
-                Some(first) => first.get("uri").is_none() && scan.layout.bin.is_some(),
+                // The BIN chunk is the first buffer's if that has no uri, and is no stand-in for compressed bytes.
+                Some(first) => {
+                    let stands_in = meshopt::NAMES.iter().any(|name| {
+                        first
+                            .get("extensions")
+                            .is_some_and(|all| all.get(name).is_some())
+                    });
+                    first.get("uri").is_none() && scan.layout.bin.is_some() && !stands_in
+                }
                 None => true,
             };
         let start = match &scan.layout.bin {
@@ -208,7 +216,10 @@ impl<'s> Appender<'s> {
             old.map(<[u8]>::to_vec)
         };
         let rest = bytes.get(layout.rest.clone()).unwrap_or_default();
-        pack_glb(&text, bin.as_deref(), rest).ok_or_else(|| too_long(text.len() + length))
+        let mut out =
+            pack_glb(&text, bin.as_deref(), rest).ok_or_else(|| too_long(text.len() + length))?;
+        out.extend_from_slice(bytes.get(layout.trailing.clone()).unwrap_or_default());
+        Ok(out)
     }
 }
 

@@ -6,32 +6,30 @@ use std::sync::Arc;
 use gltf::json::accessor::{ComponentType, Type};
 
 use super::accessor::Accessor;
-use super::buffers::Document;
 use super::error::ScanError;
 use super::json::JsonPlace;
 use super::limits::{Limit, ScanLimits};
+use super::primitive::{AttributeSource, ElementsKey, PrimitiveSource};
 use super::skin::{Influence, Influences};
 
 type TexcoordSet = Arc<[[f32; 2]]>;
 type ColorSet = Arc<[[f32; 4]]>;
 
 /// Decodes vertex attributes, each accessor once: primitives and instances share the result.
-pub(super) struct AttributeReader<'d, 'a> {
-    document: &'d Document<'a>,
+pub(super) struct AttributeReader<'d> {
     limits: &'d ScanLimits,
     /// Decoded sets by accessor.
-    texcoords: HashMap<usize, TexcoordSet>,
-    colors: HashMap<usize, (Type, ColorSet)>,
+    texcoords: HashMap<ElementsKey, TexcoordSet>,
+    colors: HashMap<ElementsKey, (Type, ColorSet)>,
     /// Decoded sets by the accessors of joints and of weights.
-    influences: HashMap<(usize, usize), Influences>,
+    influences: HashMap<(ElementsKey, ElementsKey), Influences>,
     /// Numbers decoded so far.
     values: usize,
 }
 
-impl<'d, 'a> AttributeReader<'d, 'a> {
-    pub fn new(document: &'d Document<'a>, limits: &'d ScanLimits) -> Self {
+impl<'d> AttributeReader<'d> {
+    pub fn new(limits: &'d ScanLimits) -> Self {
         Self {
-            document,
             limits,
             texcoords: HashMap::new(),
             colors: HashMap::new(),
@@ -40,39 +38,41 @@ impl<'d, 'a> AttributeReader<'d, 'a> {
         }
     }
 
-    /// The normals, if there are any; NaN and infinities read as 0.
+    /// The normals, if there are any; NaN and infinities read as 0. Integers get the length 1 that rounding took from
+    /// them; zeros stay.
     pub fn normals(
         &mut self,
-        attributes: &JsonPlace<'a>,
+        source: &PrimitiveSource<'_, '_>,
         vertices: usize,
     ) -> Result<Option<Arc<[[f32; 3]]>>, ScanError> {
-        let Some(reference) = attributes.get("NORMAL")? else {
+        let Some(normal) = source.attribute("NORMAL")? else {
             return Ok(None);
         };
-        let (_, place) = self.document.root.referred("accessors", &reference)?;
-        let accessor = self.attribute(&place, &[Type::Vec3])?;
+        let accessor = self.attribute(&normal, &[Type::Vec3])?;
+        let quantized = accessor.component != ComponentType::F32;
         let normals: Arc<[_]> = (accessor.floats([0.0; 3])?.into_iter())
             .map(|normal| normal.map(finite_or_zero))
+            .map(|normal| if quantized { unit(normal) } else { normal })
             .collect();
-        same_count(&place, normals.len(), vertices)?;
+        same_count(&normal.place, normals.len(), vertices)?;
         Ok(Some(normals))
     }
 
     /// The texture coordinate sets; NaN and infinities read as 0.
     pub fn texcoords(
         &mut self,
-        attributes: &JsonPlace<'a>,
+        source: &PrimitiveSource<'_, '_>,
         vertices: usize,
     ) -> Result<Vec<TexcoordSet>, ScanError> {
-        self.sets(attributes, |all, n| {
-            let Some(reference) = attributes.get(&format!("TEXCOORD_{n}"))? else {
+        self.sets(source, |all, n| {
+            let Some(found) = source.attribute(&format!("TEXCOORD_{n}"))? else {
                 return Ok(None);
             };
-            let (key, place) = all.document.root.referred("accessors", &reference)?;
+            let key = found.key;
             let set = match all.texcoords.get(&key) {
                 Some(set) => Arc::clone(set),
                 None => {
-                    let accessor = all.attribute(&place, &[Type::Vec2])?;
+                    let accessor = all.attribute(&found, &[Type::Vec2])?;
                     let set: Arc<[_]> = accessor
                         .floats([0.0; 2])?
                         .into_iter()
@@ -82,7 +82,7 @@ impl<'d, 'a> AttributeReader<'d, 'a> {
                     set
                 }
             };
-            same_count(&place, set.len(), vertices)?;
+            same_count(&found.place, set.len(), vertices)?;
             Ok(Some(set))
         })
     }
@@ -90,18 +90,18 @@ impl<'d, 'a> AttributeReader<'d, 'a> {
     /// The types of the colour sets in the file, and the sets; NaN and infinities read as 0.
     pub fn colors(
         &mut self,
-        attributes: &JsonPlace<'a>,
+        source: &PrimitiveSource<'_, '_>,
         vertices: usize,
     ) -> Result<(Vec<Type>, Vec<ColorSet>), ScanError> {
-        let sets = self.sets(attributes, |all, n| {
-            let Some(reference) = attributes.get(&format!("COLOR_{n}"))? else {
+        let sets = self.sets(source, |all, n| {
+            let Some(found) = source.attribute(&format!("COLOR_{n}"))? else {
                 return Ok(None);
             };
-            let (key, place) = all.document.root.referred("accessors", &reference)?;
+            let key = found.key;
             let (kind, set) = match all.colors.get(&key) {
                 Some((kind, set)) => (*kind, Arc::clone(set)),
                 None => {
-                    let accessor = all.attribute(&place, &[Type::Vec3, Type::Vec4])?;
+                    let accessor = all.attribute(&found, &[Type::Vec3, Type::Vec4])?;
                     let set = accessor
                         .floats([0.0, 0.0, 0.0, 1.0])?
                         .into_iter()
@@ -111,7 +111,7 @@ impl<'d, 'a> AttributeReader<'d, 'a> {
                     (accessor.kind, set)
                 }
             };
-            same_count(&place, set.len(), vertices)?;
+            same_count(&found.place, set.len(), vertices)?;
             Ok(Some((kind, set)))
         })?;
         Ok(sets.into_iter().unzip())
@@ -120,19 +120,17 @@ impl<'d, 'a> AttributeReader<'d, 'a> {
     /// The sets of joints and weights, up to the first set that lacks one of the two.
     pub fn influences(
         &mut self,
-        attributes: &JsonPlace<'a>,
+        source: &PrimitiveSource<'_, '_>,
         vertices: usize,
     ) -> Result<Vec<Influences>, ScanError> {
-        self.sets(attributes, |all, n| {
+        self.sets(source, |all, n| {
             let (Some(joints), Some(weights)) = (
-                attributes.get(&format!("JOINTS_{n}"))?,
-                attributes.get(&format!("WEIGHTS_{n}"))?,
+                source.attribute(&format!("JOINTS_{n}"))?,
+                source.attribute(&format!("WEIGHTS_{n}"))?,
             ) else {
                 return Ok(None);
             };
-            let (of_joints, joints) = all.document.root.referred("accessors", &joints)?;
-            let (of_weights, weights) = all.document.root.referred("accessors", &weights)?;
-            let key = (of_joints, of_weights);
+            let key = (joints.key, weights.key);
             let set = match all.influences.get(&key) {
                 Some(set) => Arc::clone(set),
                 None => {
@@ -141,7 +139,7 @@ impl<'d, 'a> AttributeReader<'d, 'a> {
                     set
                 }
             };
-            same_count(&joints, set.len(), vertices)?;
+            same_count(&joints.place, set.len(), vertices)?;
             Ok(Some(set))
         })
     }
@@ -149,7 +147,7 @@ impl<'d, 'a> AttributeReader<'d, 'a> {
     /// Sets 0, 1, … of a primitive, up to the first that `read` does not find.
     fn sets<S>(
         &mut self,
-        attributes: &JsonPlace<'a>,
+        source: &PrimitiveSource<'_, '_>,
         mut read: impl FnMut(&mut Self, usize) -> Result<Option<S>, ScanError>,
     ) -> Result<Vec<S>, ScanError> {
         let mut sets = Vec::new();
@@ -159,7 +157,7 @@ impl<'d, 'a> AttributeReader<'d, 'a> {
                 name: "max_attribute_sets",
                 allowed: self.limits.max_attribute_sets,
             };
-            limit.check(sets.len(), &attributes.pointer)?;
+            limit.check(sets.len(), &source.attributes.pointer)?;
         }
         Ok(sets)
     }
@@ -167,18 +165,20 @@ impl<'d, 'a> AttributeReader<'d, 'a> {
     /// Decodes a JOINTS accessor and its WEIGHTS; negative weights read as 0.
     fn weighted_joints(
         &mut self,
-        joints: &JsonPlace<'a>,
-        weights: &JsonPlace<'a>,
+        joints: &AttributeSource<'_, '_>,
+        weights: &AttributeSource<'_, '_>,
         vertices: usize,
     ) -> Result<Influences, ScanError> {
         let accessor = self.attribute(joints, &[Type::Vec4])?;
         if ![ComponentType::U8, ComponentType::U16].contains(&accessor.component) {
-            return Err(joints.invalid("joints must be unsigned bytes or shorts"));
+            return Err(joints
+                .place
+                .invalid("joints must be unsigned bytes or shorts"));
         }
-        same_count(joints, accessor.count, vertices)?;
+        same_count(&joints.place, accessor.count, vertices)?;
         let of_joints = accessor.quadruples()?;
         let accessor = self.attribute(weights, &[Type::Vec4])?;
-        same_count(weights, accessor.count, vertices)?;
+        same_count(&weights.place, accessor.count, vertices)?;
         let of_weights = accessor.floats([0.0; 4])?.into_iter();
         let of_weights = of_weights.map(|weights| weights.map(|w| finite_or_zero(w).max(0.0)));
         let influences = of_joints.into_iter().zip(of_weights);
@@ -188,12 +188,13 @@ impl<'d, 'a> AttributeReader<'d, 'a> {
     }
 
     /// Opens a vertex attribute and counts its values against the limit.
-    fn attribute(
+    fn attribute<'s>(
         &mut self,
-        place: &JsonPlace<'a>,
+        source: &AttributeSource<'s, '_>,
         kinds: &[Type],
-    ) -> Result<Accessor<'d>, ScanError> {
-        let accessor = Accessor::open(self.document, place)?;
+    ) -> Result<Accessor<'s>, ScanError> {
+        let place = &source.place;
+        let accessor = source.open()?;
         if !kinds.contains(&accessor.kind) {
             return Err(place.invalid(format!("must be one of {kinds:?} here")));
         }
@@ -212,6 +213,16 @@ impl<'d, 'a> AttributeReader<'d, 'a> {
 /// copy them.
 fn finite_or_zero(x: f32) -> f32 {
     if x.is_finite() { x } else { 0.0 }
+}
+
+/// A vector with length 1 and the same direction; zero stays zero.
+fn unit(vector: [f32; 3]) -> [f32; 3] {
+    let length = vector.iter().map(|x| x * x).sum::<f32>().sqrt();
+    if length > 0.0 {
+        vector.map(|x| x / length)
+    } else {
+        vector
+    }
 }
 
 fn same_count(place: &JsonPlace<'_>, count: usize, vertices: usize) -> Result<(), ScanError> {

@@ -9,8 +9,10 @@ use super::error::ScanError;
 pub enum Container {
     /// Binary glTF: the magic `glTF`, a JSON chunk and usually a BIN chunk.
     Glb,
-    /// A JSON document with its buffers as data URIs.
+    /// A JSON document; its buffers are data URIs or other files.
     Gltf,
+    /// A zip with one of these and the files that it refers to.
+    Zip,
 }
 
 impl Container {
@@ -19,6 +21,7 @@ impl Container {
         match self {
             Self::Glb => "model/gltf-binary",
             Self::Gltf => "model/gltf+json",
+            Self::Zip => "application/zip",
         }
     }
 }
@@ -32,6 +35,8 @@ pub(super) struct ContainerLayout {
     pub bin: Option<Range<usize>>,
     /// Chunks after JSON and BIN, headers included.
     pub rest: Range<usize>,
+    /// Bytes after the declared end of a GLB.
+    pub trailing: Range<usize>,
 }
 
 const MAGIC: &[u8] = b"glTF";
@@ -63,10 +68,11 @@ pub(super) fn layout(bytes: &[u8]) -> Result<ContainerLayout, ScanError> {
             json: start..bytes.len(),
             bin: None,
             rest: bytes.len()..bytes.len(),
+            trailing: bytes.len()..bytes.len(),
         }),
         _ => Err(fail(
             0,
-            "neither the magic glTF of a GLB nor the { of a JSON document",
+            "neither the magic glTF of a GLB, nor the { of a JSON document, nor the magic PK of a zip",
         )),
     }
 }
@@ -79,12 +85,13 @@ fn glb_layout(bytes: &[u8]) -> Result<ContainerLayout, ScanError> {
     if version != 2 {
         return Err(fail(4, format!("GLB version {version}; only 2 is known")));
     }
-    if length as usize != bytes.len() {
-        return Err(fail(
+    let whole = bytes;
+    let bytes = whole.get(..length as usize).ok_or_else(|| {
+        fail(
             8,
-            format!("the header says {length} bytes, there are {}", bytes.len()),
-        ));
-    }
+            format!("the header says {length} bytes, there are {}", whole.len()),
+        )
+    })?;
     let (kind, json) = chunk(bytes, HEADER)?;
     if kind != JSON_CHUNK {
         return Err(fail(HEADER + 4, "the first chunk is not JSON".into()));
@@ -114,6 +121,7 @@ fn glb_layout(bytes: &[u8]) -> Result<ContainerLayout, ScanError> {
         json,
         bin,
         rest: rest..bytes.len(),
+        trailing: bytes.len()..whole.len(),
     })
 }
 
@@ -141,7 +149,8 @@ fn word(bytes: &[u8], at: usize) -> Option<u32> {
         .map(|word| u32::from_le_bytes(*word))
 }
 
-/// Packs a GLB: JSON padded with spaces, BIN padded with zeros, then `rest`, whole chunks.
+/// Packs a GLB: JSON padded with spaces, BIN padded with zeros, then `rest`, whole chunks. What comes after the GLB is not
+/// part of it.
 ///
 /// Returns `None` if the whole would not fit the format's 32-bit lengths.
 pub(super) fn pack_glb(json: &[u8], bin: Option<&[u8]>, rest: &[u8]) -> Option<Vec<u8>> {
@@ -192,6 +201,15 @@ mod tests {
         assert_eq!(&bytes[found.json], b"{}  ");
         assert_eq!(&bytes[found.bin.unwrap()], &[1, 2, 3, 4, 5, 0, 0, 0]);
         assert_eq!(&bytes[found.rest], &rest);
+    }
+
+    #[test]
+    fn bytes_after_the_declared_length_are_set_apart() {
+        let mut bytes = pack_glb(b"{}", Some(&[1, 2, 3, 4]), &[]).unwrap();
+        let end = bytes.len();
+        bytes.extend_from_slice(b"signature");
+        let found = layout(&bytes).unwrap();
+        assert_eq!((found.rest, found.trailing), (end..end, end..end + 9));
     }
 
     #[test]

@@ -4,6 +4,9 @@
 
 use darn_budget::Exhausted;
 
+use super::content::SceneContent;
+use super::json::JsonPlace;
+
 /// Why a scan could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum ScanError {
@@ -45,9 +48,9 @@ pub enum ScanError {
         /// Which element of the accessor.
         element: usize,
     },
-    /// The geometry is stored by an extension that this version does not decode.
+    /// The geometry is stored by an extension in a version that is not decoded, or where triangles cannot be cut out.
     #[error(
-        "{pointer}: the geometry is stored with {extension}, which is not supported; export the scan without it"
+        "{pointer}: the geometry is stored with {extension} in a way that is not supported here; export the scan without it"
     )]
     Unsupported {
         /// JSON pointer to the use of the extension.
@@ -55,9 +58,18 @@ pub enum ScanError {
         /// The extension's name.
         extension: &'static str,
     },
-    /// Data that the scan needs is in another file, which is never opened.
+    /// A primitive is a Draco point cloud.
     #[error(
-        "{pointer}: the data is in another file ({uri:?}); send a GLB or embed it as a data URI"
+        "{pointer}: the Draco stream is a point cloud; only triangle meshes have holes to mend"
+    )]
+    PointCloud {
+        /// JSON pointer to the use of the extension.
+        pointer: String,
+    },
+    /// Data that the scan needs is in another file, which did not come with it; no file or URL is opened.
+    #[error(
+        "{pointer}: the data is in another file ({uri:?}) that did not come with the scan; send it as a part named by this URI, \
+         send both in a zip, or send a GLB"
     )]
     External {
         /// JSON pointer to the URI.
@@ -81,8 +93,11 @@ pub enum ScanError {
     #[error(transparent)]
     Exhausted(#[from] Exhausted),
     /// The default scene draws no triangle.
-    #[error("the default scene draws no triangles; there is nothing to mend")]
-    NoTriangles,
+    #[error("the default scene draws no triangles{content}; there is nothing to mend")]
+    NoTriangles {
+        /// What it draws.
+        content: SceneContent,
+    },
     /// A patch cannot be transformed to the space of a node whose transform is singular.
     #[error(
         "/nodes/{node}: the node's transform is singular; a patch cannot be written into its space"
@@ -102,6 +117,16 @@ pub enum ScanError {
 }
 
 impl ScanError {
+    /// The error of a file that is not there; `uri` is the place of its URI.
+    pub(super) fn external(uri: &JsonPlace<'_>) -> Self {
+        const SHOWN: usize = 80;
+        let text = uri.value.as_str().unwrap_or_default();
+        Self::External {
+            pointer: uri.pointer.clone(),
+            uri: text.chars().take(SHOWN).collect(),
+        }
+    }
+
     /// The JSON pointer of the place in the scan, where there is one.
     #[cfg(test)]
     pub(crate) fn pointer(&self) -> Option<&str> {
@@ -110,11 +135,12 @@ impl ScanError {
             | Self::IndexOutOfRange { pointer, .. }
             | Self::NotFinite { pointer, .. }
             | Self::Unsupported { pointer, .. }
+            | Self::PointCloud { pointer }
             | Self::External { pointer, .. }
             | Self::Limit { pointer, .. } => Some(pointer),
             Self::Container { .. }
             | Self::Exhausted(_)
-            | Self::NoTriangles
+            | Self::NoTriangles { .. }
             | Self::Singular { .. }
             | Self::InvalidPatch { .. } => None,
         }

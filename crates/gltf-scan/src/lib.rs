@@ -1,8 +1,10 @@
 //! Reads glTF scans as one list of triangles, and writes them back with patches appended and nothing else changed.
 //!
-//! This is the only crate that knows glTF. A scan is a GLB, or glTF JSON with its buffers as data URIs. The crate opens
-//! no file and no URL, and checks every count against the bytes behind it before it allocates. It does not weld
-//! vertices and does not look for holes.
+//! This is the only crate that knows glTF. A scan is a GLB; glTF JSON, with its buffers as data URIs or as files that the
+//! caller gives with it; or a zip with one of these and its files. Its geometry may be
+//! plain, quantized (`KHR_mesh_quantization`) or compressed (`KHR_draco_mesh_compression`, `EXT_meshopt_compression`,
+//! `KHR_meshopt_compression`); patches are plain floats. The crate opens no file and no URL, and checks every count
+//! against the bytes behind it before it allocates. It does not weld vertices and does not look for holes.
 //!
 //! Skinned meshes are read in their bind pose: at their stored positions, without their node's transform. A patch on a
 //! skinned mesh takes the joints and weights of the scan's nearest vertices. Morph targets are read at weight 0, even
@@ -13,16 +15,25 @@ mod accessor;
 mod append;
 mod attributes;
 mod buffers;
+mod compressed;
+#[cfg(test)]
+mod compressed_tests;
 mod container;
+mod content;
 mod cut;
 mod error;
 pub mod export;
+mod files;
+#[cfg(test)]
+mod files_tests;
 mod json;
 mod json_edit;
 mod left_out;
 mod limits;
+mod pack;
 mod patch_primitive;
 mod patch_skin;
+mod primitive;
 mod read;
 #[cfg(test)]
 mod read_tests;
@@ -35,10 +46,14 @@ mod triangles;
 mod write;
 #[cfg(test)]
 mod write_tests;
+mod zip_files;
 
 pub use container::Container;
+pub use content::SceneContent;
 pub use error::ScanError;
+pub use files::{Siblings, sibling_paths};
 pub use left_out::NamedPlace;
 pub use limits::ScanLimits;
+pub use pack::repacked;
 pub use patch_primitive::{PatchPoint, PatchPrimitive};
 pub use scan::{Scan, ScanPart};

@@ -19,6 +19,8 @@ pub struct ScanLimits {
     pub max_attribute_sets: usize,
     /// Morph targets of one primitive; every patch of its mesh gets as many.
     pub max_morph_targets: usize,
+    /// Bytes that the compressed streams of a scan decode to together.
+    pub max_decoded_bytes: usize,
     /// Values in the JSON, keys included; an upper estimate, made before they are parsed.
     pub max_json_values: usize,
 }
@@ -33,6 +35,7 @@ impl Default for ScanLimits {
             max_attribute_values: 32_000_000,
             max_attribute_sets: 16,
             max_morph_targets: 1024,
+            max_decoded_bytes: 1 << 29,
             max_json_values: 1_000_000,
         }
     }

@@ -12,20 +12,22 @@ use serde_json::Value;
 use super::accessor::{Accessor, is_unsigned};
 use super::attributes::AttributeReader;
 use super::buffers::Document;
+use super::compressed::DecodeAllowance;
+use super::content::SceneContent;
 use super::error::ScanError;
+use super::files::{Companions, Siblings};
 use super::json::{JsonPlace, json_held, values_at_most};
 use super::limits::{Limit, ScanLimits};
+use super::primitive::{AttributeSource, ElementsKey, PrimitiveSource};
 use super::scan::{Scan, ScanPart, VertexBlock};
 use super::scene::{MeshNode, mesh_nodes};
 use super::skin::skinned_meshes;
 use super::triangles::IndexList;
+use super::zip_files::{self, ZipFiles};
 use darn_geometry::mesh::{TriMesh, Vec3};
 
-const DRACO: &str = "KHR_draco_mesh_compression";
-const QUANTIZED: &str = "KHR_mesh_quantization";
-
 impl Scan {
-    /// Reads a scan. Its first bytes decide between GLB and JSON; only data URIs and the BIN chunk are read.
+    /// Reads a scan. Its first bytes decide between GLB, JSON and zip; data is read from the BIN chunk, data URIs and the zip.
     ///
     /// The scan keeps `bytes` and does not copy them (a `Vec<u8>` is taken over, a slice needs
     /// [`Bytes::copy_from_slice`]). Further memory: about 100 bytes a JSON value, 36 a vertex, 12 a face and 4 an
@@ -34,7 +36,12 @@ impl Scan {
     /// # Errors
     /// See [`ScanError`]; a scan that draws no triangle is [`ScanError::NoTriangles`].
     pub fn read(bytes: impl Into<Bytes>, limits: &ScanLimits) -> Result<Self, ScanError> {
-        read(bytes.into(), limits, Budget::unlimited())
+        read(
+            bytes.into(),
+            Siblings::default(),
+            limits,
+            Budget::unlimited(),
+        )
     }
 
     /// [`Scan::read`] within a request's budget.
@@ -46,7 +53,20 @@ impl Scan {
         limits: &ScanLimits,
         budget: &Budget,
     ) -> Result<Self, ScanError> {
-        read(bytes.into(), limits, budget)
+        read(bytes.into(), Siblings::default(), limits, budget)
+    }
+
+    /// [`Scan::read_within`], with the files beside a glTF.
+    ///
+    /// # Errors
+    /// As [`Scan::read_within`].
+    pub fn read_with_siblings(
+        bytes: impl Into<Bytes>,
+        siblings: Siblings,
+        limits: &ScanLimits,
+        budget: &Budget,
+    ) -> Result<Self, ScanError> {
+        read(bytes.into(), siblings, limits, budget)
     }
 }
 
@@ -55,7 +75,28 @@ const JSON_VALUE: usize = 100;
 /// Nanoseconds of work a JSON value.
 const VALUE_WORK: u64 = 150;
 
-fn read(bytes: Bytes, limits: &ScanLimits, budget: &Budget) -> Result<Scan, ScanError> {
+fn read(
+    bytes: Bytes,
+    siblings: Siblings,
+    limits: &ScanLimits,
+    budget: &Budget,
+) -> Result<Scan, ScanError> {
+    let allowance = DecodeAllowance::new(limits, budget);
+    if bytes.starts_with(zip_files::MAGIC) {
+        let zip = ZipFiles::open(bytes)?;
+        let main = zip.main(&allowance)?;
+        return read_files(main, Companions::Zip(zip), allowance);
+    }
+    read_files(bytes, Companions::Siblings(siblings), allowance)
+}
+
+/// Reads a glTF and the files that it refers to.
+fn read_files(
+    bytes: Bytes,
+    companions: Companions,
+    allowance: DecodeAllowance<'_>,
+) -> Result<Scan, ScanError> {
+    let (limits, budget) = (allowance.limits, allowance.budget);
     let layout = super::container::layout(&bytes)?;
     let text = bytes.get(layout.json.clone()).unwrap_or_default();
     let limit = Limit {
@@ -73,7 +114,7 @@ fn read(bytes: Bytes, limits: &ScanLimits, budget: &Budget) -> Result<Scan, Scan
     let root = JsonPlace::root(&json);
     check_version(&root)?;
     let bin = layout.bin.clone().and_then(|range| bytes.get(range));
-    let document = Document::new(root.clone(), bin)?;
+    let document = Document::new(root.clone(), bin, &companions, allowance)?;
     let nodes = mesh_nodes(&root, limits)?;
     let mut instances: HashMap<usize, usize> = HashMap::new();
     for node in &nodes {
@@ -94,11 +135,13 @@ fn read(bytes: Bytes, limits: &ScanLimits, budget: &Budget) -> Result<Scan, Scan
         parts,
         blocks,
         not_finite,
+        others: content,
         ..
     } = reader;
     if surface.faces.is_empty() {
-        return Err(ScanError::NoTriangles);
+        return Err(ScanError::NoTriangles { content });
     }
+    document.release();
     let json_held = json_held(&json);
     let scan = Scan {
         surface,
@@ -107,10 +150,12 @@ fn read(bytes: Bytes, limits: &ScanLimits, budget: &Budget) -> Result<Scan, Scan
         blocks,
         bytes,
         layout,
+        companions,
         json,
         cut: BTreeSet::new(),
         json_held,
     };
+    budget.hold(scan.unpacked_bytes())?;
     budget.hold(scan.decoded_bytes())?;
     Ok(scan)
 }
@@ -149,8 +194,10 @@ struct ScanReader<'d, 'a> {
     blocks: Vec<VertexBlock>,
     /// Vertices whose position is not finite, ascending; triangles that use one are refused.
     not_finite: Vec<u32>,
-    attributes: AttributeReader<'d, 'a>,
+    attributes: AttributeReader<'d>,
     skinned: BTreeSet<usize>,
+    /// Primitives that draw no triangles.
+    others: SceneContent,
     /// Primitives so far, points and lines included.
     primitives: usize,
     /// Triangles so far, degenerate ones included.
@@ -159,14 +206,17 @@ struct ScanReader<'d, 'a> {
 
 impl<'d, 'a> ScanReader<'d, 'a> {
     fn new(document: &'d Document<'a>, limits: &'d ScanLimits) -> Self {
+        let meshes = document.root.value.get("meshes");
+        let meshes = meshes.and_then(Value::as_array).map_or(0, Vec::len);
         Self {
             document,
             limits,
+            others: SceneContent::of(meshes),
             surface: TriMesh::default(),
             parts: Vec::new(),
             blocks: Vec::new(),
             not_finite: Vec::new(),
-            attributes: AttributeReader::new(document, limits),
+            attributes: AttributeReader::new(limits),
             skinned: skinned_meshes(document.root.value),
             primitives: 0,
             faces: 0,
@@ -181,7 +231,7 @@ impl<'d, 'a> ScanReader<'d, 'a> {
         let Some(mesh) = meshes.item(instance.node.mesh)? else {
             return Ok(());
         };
-        // The node's vertices by POSITION accessor.
+        // The node's vertices by what their positions are read from.
         let mut vertices = BTreeMap::new();
         for (index, place) in mesh.need("primitives")?.items()?.enumerate() {
             self.primitives += 1;
@@ -202,38 +252,30 @@ impl<'d, 'a> ScanReader<'d, 'a> {
         instance: &MeshInstance<'_>,
         index: usize,
         place: &JsonPlace<'a>,
-        vertices_of: &mut BTreeMap<usize, Range<u32>>,
+        vertices_of: &mut BTreeMap<ElementsKey, Range<u32>>,
     ) -> Result<Option<ScanPart>, ScanError> {
         let mode = u32::try_from(place.integer_or("mode", TRIANGLES as usize)?).unwrap_or(u32::MAX);
         if ![TRIANGLES, TRIANGLE_STRIP, TRIANGLE_FAN].contains(&mode) {
+            self.others.count(place, mode)?;
             return Ok(None);
         }
-        let attributes = place.need("attributes")?;
-        let Some(position) = attributes.get("POSITION")? else {
+        let source = PrimitiveSource::open(self.document, place)?;
+        let Some(position) = source.attribute("POSITION")? else {
+            self.others.count(place, mode)?;
             return Ok(None);
         };
-        let (key, accessor) = self.document.root.referred("accessors", &position)?;
-        if let Some(draco) = place.extension(DRACO)? {
-            // If the file does not require the extension, plain accessors may be there as a fallback.
-            if self.document.requires(DRACO) || accessor.get("bufferView")?.is_none() {
-                return Err(ScanError::Unsupported {
-                    pointer: draco.pointer,
-                    extension: DRACO,
-                });
-            }
-        }
         let node = instance.node;
-        let vertices = match vertices_of.get(&key) {
+        let vertices = match vertices_of.get(&position.key) {
             Some(vertices) => vertices.clone(),
             None => {
-                let vertices = self.read_positions(node, &accessor)?;
-                vertices_of.insert(key, vertices.clone());
+                let vertices = self.read_positions(node, &position)?;
+                vertices_of.insert(position.key, vertices.clone());
                 vertices
             }
         };
         let (start, count) = (vertices.start, vertices.len());
-        let faces = self.read_triangles(place, mode, count)?;
-        self.check_used(&faces, &vertices, &accessor.pointer)?;
+        let faces = self.read_triangles(&source, mode, count)?;
+        self.check_used(&faces, &vertices, &position.place.pointer)?;
         let mirrored = node.transform.mirrors();
         let first = self.surface.faces.len() as u32;
         self.surface.faces.extend(
@@ -245,12 +287,12 @@ impl<'d, 'a> ScanReader<'d, 'a> {
                     [start + a, start + b, start + c]
                 }),
         );
-        let normals = self.attributes.normals(&attributes, count)?;
-        let texcoords = self.attributes.texcoords(&attributes, count)?;
-        let (color_kinds, colors) = self.attributes.colors(&attributes, count)?;
+        let normals = self.attributes.normals(&source, count)?;
+        let texcoords = self.attributes.texcoords(&source, count)?;
+        let (color_kinds, colors) = self.attributes.colors(&source, count)?;
         let skinned = self.skinned.contains(&node.mesh);
         let skinning = skinned
-            .then(|| self.attributes.influences(&attributes, count))
+            .then(|| self.attributes.influences(&source, count))
             .transpose()?;
         let material = match place.get("material")? {
             Some(reference) => Some(self.document.root.referred("materials", &reference)?.0),
@@ -301,17 +343,16 @@ impl<'d, 'a> ScanReader<'d, 'a> {
     fn read_positions(
         &mut self,
         node: &MeshNode,
-        place: &JsonPlace<'a>,
+        position: &AttributeSource<'d, 'a>,
     ) -> Result<Range<u32>, ScanError> {
-        let accessor = Accessor::open(self.document, place)?;
+        let accessor = position.open()?;
+        let place = &position.place;
         if accessor.kind != Type::Vec3 {
             return Err(place.invalid("positions must be VEC3"));
         }
-        if accessor.component != ComponentType::F32 {
-            return Err(ScanError::Unsupported {
-                pointer: accessor.pointer,
-                extension: QUANTIZED,
-            });
+        // Integers up to 16 bits are quantized positions (KHR_mesh_quantization), exact in f32.
+        if accessor.component == ComponentType::U32 {
+            return Err(place.invalid("positions must be floats, bytes or shorts"));
         }
         let first = self.surface.positions.len();
         let limit = Limit {
@@ -369,10 +410,15 @@ impl<'d, 'a> ScanReader<'d, 'a> {
     /// The triangles of a primitive, indices below `vertices`; degenerate ones included.
     fn read_triangles(
         &mut self,
-        place: &JsonPlace<'a>,
+        source: &PrimitiveSource<'d, 'a>,
         mode: u32,
         vertices: usize,
     ) -> Result<Vec<[u32; 3]>, ScanError> {
+        let place = &source.place;
+        if let Some(count) = source.stream_faces() {
+            self.count_faces(TRIANGLES, count.saturating_mul(3), &place.pointer)?;
+            return source.stream_triangles(vertices);
+        }
         let indices = match place.get("indices")? {
             Some(reference) => {
                 let (_, place) = self.document.root.referred("accessors", &reference)?;

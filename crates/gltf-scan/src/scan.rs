@@ -10,6 +10,7 @@ use gltf::json::accessor::Type;
 use serde_json::Value;
 
 use super::container::{Container, ContainerLayout};
+use super::files::{Companions, Siblings};
 use super::scene::NodeTransform;
 use super::skin::{Influence, Influences};
 
@@ -28,6 +29,7 @@ pub struct Scan {
     pub(crate) blocks: Vec<VertexBlock>,
     pub(crate) bytes: Bytes,
     pub(crate) layout: ContainerLayout,
+    pub(crate) companions: Companions,
     pub(crate) json: Value,
     /// The primitives, by mesh and index, of which triangles were cut out; see [`Scan::without_faces`].
     pub(crate) cut: BTreeSet<(usize, usize)>,
@@ -55,7 +57,7 @@ pub struct ScanPart {
     pub texcoords: Vec<Arc<[[f32; 2]]>>,
     /// COLOR_0, COLOR_1, … in the same way, linear RGBA; a set without alpha has alpha 1.
     pub colors: Vec<Arc<[[f32; 4]]>>,
-    /// NORMAL as stored, in the node's space, `[vertices.len()]`; without normals the primitive is drawn flat.
+    /// NORMAL as stored (quantized ones with length 1), in the node's space, `[vertices.len()]`; without normals the primitive is drawn flat.
     pub normals: Option<Arc<[[f32; 3]]>>,
     /// Whether darn made it: its `extras.darn.reconstructed` says so.
     pub reconstructed: bool,
@@ -87,12 +89,38 @@ pub(crate) struct VertexBlock {
 impl Scan {
     /// The container it was read from; [`Scan::write`] writes the same.
     pub fn container(&self) -> Container {
-        self.layout.container
+        match self.companions {
+            Companions::Zip(_) => Container::Zip,
+            _ => self.layout.container,
+        }
+    }
+
+    /// The files that were read with the scan, by their paths relative to it. None of a zip.
+    pub fn siblings(&self) -> impl Iterator<Item = (&str, &[u8])> {
+        let files = match &self.companions {
+            Companions::Siblings(Siblings(files)) => Some(files),
+            _ => None,
+        };
+        let files = files.into_iter().flatten();
+        files.map(|(path, bytes)| (path.as_str(), bytes.as_ref()))
+    }
+
+    /// Bytes of the glTF of a zip, which are held beside the zip.
+    pub(crate) fn unpacked_bytes(&self) -> usize {
+        match self.companions {
+            Companions::Zip(_) => self.bytes.len(),
+            _ => 0,
+        }
+    }
+
+    /// Bytes after the declared end of the GLB; [`Scan::write`] keeps them there.
+    pub fn trailing_bytes(&self) -> usize {
+        self.layout.trailing.len()
     }
 
     /// Memory it holds, in bytes, estimated.
     pub fn bytes_held(&self) -> usize {
-        self.bytes.len() + self.json_held + self.decoded_bytes()
+        self.bytes.len() + self.companions.bytes_held() + self.json_held + self.decoded_bytes()
     }
 
     /// Memory of the decoded geometry and attributes.

@@ -12,6 +12,7 @@ use super::buffers::BufferTarget;
 use super::container::float_bytes;
 use super::cut::{cut_primitives, index_bytes};
 use super::error::ScanError;
+use super::files::Companions;
 use super::patch_primitive::{PatchPoint, PatchPrimitive};
 use super::patch_skin::patch_influences;
 use super::scan::{Scan, ScanPart};
@@ -47,7 +48,11 @@ impl Scan {
         budget: &Budget,
     ) -> Result<Vec<u8>, ScanError> {
         if patches.is_empty() && self.cut.is_empty() {
-            return Ok(self.bytes.to_vec());
+            let bytes = match &self.companions {
+                Companions::Zip(zip) => &zip.bytes,
+                _ => &self.bytes,
+            };
+            return Ok(bytes.to_vec());
         }
         let mut out = Appender::new(self);
         cut_primitives(self, &mut out)?;
@@ -74,7 +79,11 @@ impl Scan {
             }
         }
         budget.check_output(self.bytes.len() + out.appended_bytes())?;
-        out.finish()
+        let mended = out.finish()?;
+        match &self.companions {
+            Companions::Zip(zip) => zip.with_main(&mended),
+            _ => Ok(mended),
+        }
     }
 }
 

@@ -171,7 +171,7 @@ impl MendError {
                 ScanError::Unsupported { .. } => codes::UNSUPPORTED_EXTENSION,
                 ScanError::External { .. } => codes::EXTERNAL_DATA,
                 ScanError::Limit { .. } => codes::SCAN_TOO_LARGE,
-                ScanError::NoTriangles => codes::NO_TRIANGLES,
+                ScanError::NoTriangles { .. } | ScanError::PointCloud { .. } => codes::NO_TRIANGLES,
                 ScanError::Singular { .. } => codes::SINGULAR_TRANSFORM,
                 ScanError::InvalidPatch { .. } | ScanError::Exhausted(_) => codes::INTERNAL,
             },

@@ -57,6 +57,12 @@ pub fn notes(welded: &WeldedScan, scan: &Scan) -> Vec<String> {
             listed("node", &levels)
         ));
     }
+    let trailing = scan.trailing_bytes();
+    if trailing > 0 {
+        notes.push(format!(
+            "{trailing} byte(s) follow the end that the file declares; they are kept after the end of the mended file"
+        ));
+    }
     notes
 }
 

@@ -1,0 +1,159 @@
+//! Scans of several files: a glTF and the files that it refers to by relative URIs.
+//!
+//! Nothing here opens a file: the caller gives the bytes, by path, or in a zip. A URI that leads anywhere else than to a
+//! file beside or below the glTF is refused.
+
+use std::collections::BTreeMap;
+
+use bytes::Bytes;
+use serde_json::Value;
+
+use super::compressed::DecodeAllowance;
+use super::error::ScanError;
+use super::zip_files::ZipFiles;
+
+/// The files that lie beside a glTF, by their paths relative to it, with `/` between folders.
+#[derive(Debug, Clone, Default)]
+pub struct Siblings(pub BTreeMap<String, Bytes>);
+
+/// Where a scan's separate files are.
+#[derive(Debug, Clone)]
+pub(super) enum Companions {
+    /// In memory; none, if the scan is one file.
+    Siblings(Siblings),
+    /// In the zip that the glTF came in.
+    Zip(ZipFiles),
+}
+
+impl Companions {
+    /// The bytes of the file that a URI refers to; `None` if it is not there.
+    pub fn file(
+        &self,
+        uri: &str,
+        allowance: &DecodeAllowance<'_>,
+    ) -> Result<Option<Bytes>, ScanError> {
+        for path in paths(uri) {
+            let found = match self {
+                Self::Siblings(Siblings(files)) => files.get(&path).cloned(),
+                Self::Zip(zip) => zip.sibling(&path, allowance)?,
+            };
+            if found.is_some() {
+                return Ok(found);
+            }
+        }
+        Ok(None)
+    }
+
+    /// Bytes of memory of the files.
+    pub fn bytes_held(&self) -> usize {
+        match self {
+            Self::Siblings(Siblings(files)) => files.values().map(Bytes::len).sum(),
+            Self::Zip(zip) => zip.bytes.len(),
+        }
+    }
+}
+
+/// The paths of the files beside a glTF that its buffers and images refer to. Without data URIs, and without URIs that no
+/// sibling can have: reading the glTF names those. A URI with escapes stands for two paths: without, and as spelled.
+///
+/// # Errors
+/// The JSON does not parse.
+pub fn sibling_paths(gltf: &[u8]) -> Result<Vec<String>, ScanError> {
+    let text = gltf.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(gltf);
+    let json = darn_json::value(text).map_err(|error| ScanError::Container {
+        offset: 0,
+        detail: format!("the JSON does not parse: {error}"),
+    })?;
+    let list = |key: &str| {
+        json.get(key)
+            .and_then(Value::as_array)
+            .into_iter()
+            .flatten()
+    };
+    let all = list("buffers").chain(list("images"));
+    let uris = all.filter_map(|item| item.get("uri")?.as_str());
+    Ok(uris
+        .filter(|uri| !uri.starts_with("data:"))
+        .flat_map(paths)
+        .collect())
+}
+
+/// The paths that a relative URI may mean, the likeliest first: percent-decoded, then as spelled (many exporters do not
+/// encode). None for absolute paths, URLs, and paths that lead upward.
+fn paths(uri: &str) -> Vec<String> {
+    let mut paths: Vec<String> = Vec::new();
+    for text in [percent_decoded(uri), Some(uri.to_owned())] {
+        let path = text.and_then(|text| relative(&text));
+        paths.extend(path.filter(|path| !paths.contains(path)));
+    }
+    paths
+}
+
+/// A path without `.` segments; `None` if it is absolute, a URL, or leads upward.
+pub(super) fn relative(path: &str) -> Option<String> {
+    // Exporters on Windows write their own separator.
+    let path = path.replace('\\', "/");
+    let first = path.split('/').next().unwrap_or_default();
+    if path.starts_with('/') || first.contains(':') || path.contains('\0') {
+        return None;
+    }
+    let mut segments = Vec::new();
+    for segment in path.split('/') {
+        match segment {
+            "" | "." => {}
+            ".." => return None,
+            segment => segments.push(segment),
+        }
+    }
+    (!segments.is_empty()).then(|| segments.join("/"))
+}
+
+/// A URI without its percent escapes; `None` if one is broken or the result is no UTF-8.
+fn percent_decoded(uri: &str) -> Option<String> {
+    let mut bytes = Vec::with_capacity(uri.len());
+    let mut rest = uri.as_bytes();
+    while let Some((&byte, after)) = rest.split_first() {
+        rest = after;
+        if byte == b'%' {
+            let (digits, after) = rest.split_at_checked(2)?;
+            let digits = std::str::from_utf8(digits).ok()?;
+            if !digits.bytes().all(|digit| digit.is_ascii_hexdigit()) {
+                return None;
+            }
+            bytes.push(u8::from_str_radix(digits, 16).ok()?);
+            rest = after;
+        } else {
+            bytes.push(byte);
+        }
+    }
+    String::from_utf8(bytes).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_paths_beside_and_below_are_followed() {
+        for (uri, expected) in [
+            ("cloth.bin", vec!["cloth.bin"]),
+            (
+                "./maps//cloth%20plaid.png",
+                vec!["maps/cloth plaid.png", "maps/cloth%20plaid.png"],
+            ),
+            ("100%.bin", vec!["100%.bin"]),
+            ("maps\\a.png", vec!["maps/a.png"]),
+            ("../cloth.bin", vec![]),
+            ("maps/../../cloth.bin", vec![]),
+            ("%2e%2e/cloth.bin", vec!["%2e%2e/cloth.bin"]),
+            ("/etc/passwd", vec![]),
+            ("\\\\host\\share", vec![]),
+            ("C:\\cloth.bin", vec![]),
+            ("https://example.org/cloth.bin", vec![]),
+            ("file:cloth.bin", vec![]),
+            ("", vec![]),
+        ] {
+            assert_eq!(paths(uri), expected, "{uri}");
+        }
+    }
+}

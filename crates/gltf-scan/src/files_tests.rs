@@ -1,0 +1,238 @@
+//! Laws of scans that come in several files.
+
+use std::collections::BTreeMap;
+use std::io::{Cursor, Write as _};
+
+use bytes::Bytes;
+use darn_budget::Budget;
+use darn_geometry::mesh::Vec3;
+use serde_json::{Value, json};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipArchive, ZipWriter};
+
+use super::testing::Builder;
+use super::{
+    Container, PatchPoint, PatchPrimitive, Scan, ScanError, ScanLimits, Siblings, repacked,
+    sibling_paths,
+};
+
+const PICTURE: &[u8] = b"\x89PNG of a plaid";
+
+/// The unit square, its buffer in `uri` and its picture beside it.
+fn separate(uri: &str) -> (Vec<u8>, Vec<u8>) {
+    let mut scan = Builder::square();
+    scan.json["buffers"][0] = json!({"byteLength": scan.bin.len(), "uri": uri});
+    scan.json["images"] = json!([{"uri": "maps/cloth%20plaid.png"}]);
+    (scan.json.to_string().into_bytes(), scan.bin)
+}
+
+fn siblings(name: &str, bin: Vec<u8>) -> Siblings {
+    let picture = (
+        "maps/cloth plaid.png".to_owned(),
+        Bytes::from_static(PICTURE),
+    );
+    Siblings(BTreeMap::from([(name.to_owned(), bin.into()), picture]))
+}
+
+fn read(gltf: &[u8], files: Siblings) -> Result<Scan, ScanError> {
+    let budget = Budget::unlimited();
+    Scan::read_with_siblings(gltf.to_vec(), files, &ScanLimits::default(), budget)
+}
+
+fn patch() -> PatchPrimitive {
+    PatchPrimitive {
+        name: "patch".into(),
+        part: 0,
+        material_of: 0,
+        points: vec![
+            PatchPoint::Scan(0),
+            PatchPoint::Scan(1),
+            PatchPoint::New(Vec3::new(0.5, 0.5, 1.0)),
+        ],
+        normals: Vec::new(),
+        texcoords: Vec::new(),
+        colors: Vec::new(),
+        faces: vec![[0, 1, 2]],
+        both_sides: false,
+        extras: json!({"reconstructed": true}),
+    }
+}
+
+/// A zip of files; those that end in `.bin` are deflated.
+fn zipped(files: &[(&str, &[u8])]) -> Vec<u8> {
+    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+    for (name, bytes) in files {
+        let method = match name.ends_with(".bin") {
+            true => CompressionMethod::Deflated,
+            false => CompressionMethod::Stored,
+        };
+        let options = SimpleFileOptions::default().compression_method(method);
+        zip.start_file(*name, options).unwrap();
+        zip.write_all(bytes).unwrap();
+    }
+    zip.finish().unwrap().into_inner()
+}
+
+#[test]
+fn a_buffer_beside_the_scan_is_read_and_stays_there() {
+    for (uri, name) in [
+        ("cloth.bin", "cloth.bin"),
+        ("./bins/my%20cloth.bin", "bins/my cloth.bin"),
+        ("my cloth.bin", "my cloth.bin"),
+        ("100%.bin", "100%.bin"),
+    ] {
+        let (gltf, bin) = separate(uri);
+        assert!(
+            sibling_paths(&gltf)
+                .unwrap()
+                .iter()
+                .any(|path| path == name)
+        );
+        let scan = read(&gltf, siblings(name, bin)).unwrap();
+        assert_eq!(scan.surface.faces.len(), 2, "{uri}");
+        assert_eq!(scan.container(), Container::Gltf);
+        let out = scan.write(&[patch()]).unwrap();
+        let json: Value = serde_json::from_slice(&out).unwrap();
+        assert_eq!(json["buffers"][0]["uri"], uri);
+        assert!(
+            json["buffers"][1]["uri"]
+                .as_str()
+                .unwrap()
+                .starts_with("data:")
+        );
+        assert_eq!(json["images"][0]["uri"], "maps/cloth%20plaid.png");
+    }
+}
+
+#[test]
+fn a_file_that_did_not_come_or_lies_elsewhere_is_named() {
+    for uri in [
+        "missing.bin",
+        "../cloth.bin",
+        "/cloth.bin",
+        "https://example.org/cloth.bin",
+        "C:\\cloth.bin",
+    ] {
+        let (gltf, bin) = separate(uri);
+        let mut files = siblings("cloth.bin", bin.clone());
+        files.0.insert("../cloth.bin".to_owned(), bin.into());
+        let error = read(&gltf, files).unwrap_err();
+        assert_eq!(error.pointer(), Some("/buffers/0/uri"), "{uri}: {error}");
+        assert!(
+            matches!(error, ScanError::External { .. }),
+            "{uri}: {error}"
+        );
+    }
+}
+
+#[test]
+fn a_glb_is_packed_with_buffers_and_images_in_it() {
+    let (gltf, bin) = separate("cloth.bin");
+    let scan = read(&gltf, siblings("cloth.bin", bin.clone())).unwrap();
+    let packed = scan.packed(&scan.write(&[patch()]).unwrap()).unwrap();
+    let again = Scan::read(packed.clone(), &ScanLimits::default()).unwrap();
+    assert_eq!(again.container(), Container::Glb);
+    assert_eq!(again.parts.len(), 2);
+    assert_eq!(again.surface.positions[..4], scan.surface.positions[..]);
+    assert_eq!(again.surface.positions[6], Vec3::new(0.5, 0.5, 1.0));
+    let image = &again.json["images"][0];
+    assert_eq!(image["mimeType"], "image/png");
+    assert!(image.get("uri").is_none());
+    assert!(packed.windows(PICTURE.len()).any(|at| at == PICTURE));
+    assert_eq!(again.json["buffers"].as_array().map(Vec::len), Some(1));
+    let without = Siblings(BTreeMap::from([("cloth.bin".to_owned(), bin.into())]));
+    let scan = read(&gltf, without).unwrap();
+    let packed = scan.packed(&gltf).unwrap();
+    let again = Scan::read(packed, &ScanLimits::default()).unwrap();
+    assert_eq!(again.json["images"][0]["uri"], "maps/cloth%20plaid.png");
+}
+
+#[test]
+fn a_zip_is_read_and_its_other_entries_stay_as_they_are() {
+    let (gltf, bin) = separate("cloth.bin");
+    let zip = zipped(&[
+        ("scan/cloth.bin", &bin),
+        ("scan/cloth.gltf", &gltf),
+        ("scan/maps/cloth plaid.png", PICTURE),
+        ("__MACOSX/scan/._cloth.gltf", b"fork"),
+    ]);
+    let scan = Scan::read(zip.clone(), &ScanLimits::default()).unwrap();
+    assert_eq!(scan.container(), Container::Zip);
+    assert_eq!(scan.surface.faces.len(), 2);
+    assert_eq!(scan.write(&[]).unwrap(), zip);
+    let out = scan.write(&[patch()]).unwrap();
+    assert_eq!(
+        Scan::read(out.clone(), &ScanLimits::default())
+            .unwrap()
+            .parts
+            .len(),
+        2
+    );
+    let raw = |bytes: &[u8], name: &str| {
+        let mut archive = ZipArchive::new(Cursor::new(bytes.to_vec())).unwrap();
+        let index = archive.index_for_name(name).unwrap();
+        let mut out = Vec::new();
+        std::io::copy(&mut archive.by_index_raw(index).unwrap(), &mut out).unwrap();
+        out
+    };
+    for name in [
+        "scan/cloth.bin",
+        "scan/maps/cloth plaid.png",
+        "__MACOSX/scan/._cloth.gltf",
+    ] {
+        assert_eq!(raw(&out, name), raw(&zip, name), "{name}");
+    }
+    let form = |container| {
+        repacked(
+            out.clone(),
+            container,
+            &ScanLimits::default(),
+            Budget::unlimited(),
+        )
+        .unwrap()
+    };
+    let (container, gltf) = form(Container::Gltf);
+    assert_eq!(container, Container::Gltf);
+    assert_eq!(gltf, raw(&out, "scan/cloth.gltf"));
+    let (container, glb) = form(Container::Glb);
+    assert_eq!(container, Container::Glb);
+    assert_eq!(
+        Scan::read(glb, &ScanLimits::default()).unwrap().parts.len(),
+        2
+    );
+}
+
+#[test]
+fn zips_that_are_no_scan_are_refused() {
+    let (gltf, bin) = separate("cloth.bin");
+    let refused = |files: &[(&str, &[u8])]| {
+        let error = Scan::read(zipped(files), &ScanLimits::default()).unwrap_err();
+        assert!(
+            matches!(
+                error,
+                ScanError::Container { .. } | ScanError::External { .. }
+            ),
+            "{error}"
+        );
+        error.to_string()
+    };
+    assert!(refused(&[("cloth.bin", &bin)]).contains("no .gltf"));
+    let two = refused(&[("a.gltf", &gltf), ("b.glb", &gltf), ("cloth.bin", &bin)]);
+    assert!(two.contains("2 scans"), "{two}");
+    assert!(refused(&[("a.gltf", &gltf)]).contains("cloth.bin"));
+    let names: Vec<String> = (0..10_001).map(|k| k.to_string()).collect();
+    let many: Vec<(&str, &[u8])> = names.iter().map(|name| (name.as_str(), &b""[..])).collect();
+    assert!(refused(&many).contains("10001 entries"));
+    let zeros = vec![0; 64 << 20];
+    assert!(refused(&[("a.gltf", &gltf), ("cloth.bin", &zeros)]).contains("200 times"));
+    let whole = zipped(&[("a.gltf", &gltf), ("cloth.bin", &bin)]);
+    for k in (4..whole.len()).step_by(3) {
+        assert!(Scan::read(whole[..k].to_vec(), &ScanLimits::default()).is_err());
+    }
+    let tight = ScanLimits {
+        max_decoded_bytes: gltf.len() + 10,
+        ..ScanLimits::default()
+    };
+    let error = Scan::read(whole, &tight).unwrap_err();
+    assert!(error.to_string().contains("max_decoded_bytes"), "{error}");
+}

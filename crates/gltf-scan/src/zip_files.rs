@@ -1,0 +1,163 @@
+//! A zip with a glTF and its files: entries are read when they are needed, and copied as they are into the mended zip.
+
+use std::io::{Cursor, Read, Write};
+
+use bytes::Bytes;
+use zip::result::ZipError;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipArchive, ZipWriter};
+
+use super::compressed::DecodeAllowance;
+use super::error::ScanError;
+use super::files::relative;
+
+/// The first bytes of a zip.
+pub(super) const MAGIC: &[u8] = b"PK\x03\x04";
+
+/// The first bytes of an entry's header in the central directory.
+const ENTRY_MAGIC: &[u8] = b"PK\x01\x02";
+/// Most entries of a zip.
+const MAX_ENTRIES: usize = 10_000;
+/// Most bytes that a byte of an entry unpacks to: floats compress a few times, zeros a thousand times.
+const MAX_RATIO: u64 = 200;
+/// Entries of fewer bytes may compress as well as they like.
+const SMALL_ENTRY: u64 = 1 << 20;
+/// Nanoseconds of work an unpacked byte.
+const BYTE_WORK: u64 = 5;
+
+/// A zip and the entry that is the scan.
+#[derive(Debug, Clone)]
+pub(super) struct ZipFiles {
+    /// The whole zip.
+    pub bytes: Bytes,
+    /// Path of the glTF in it.
+    pub main: String,
+    /// The same bytes with their directory; a clone shares both.
+    archive: ZipArchive<Cursor<Bytes>>,
+}
+
+impl ZipFiles {
+    /// Finds the one glTF in a zip.
+    pub fn open(bytes: Bytes) -> Result<Self, ScanError> {
+        // Before the directory is read, which takes ten times its bytes of memory.
+        let headers = bytes.windows(ENTRY_MAGIC.len());
+        let entries = headers.filter(|bytes| *bytes == ENTRY_MAGIC).count();
+        if entries > MAX_ENTRIES {
+            return Err(broken(format!(
+                "it has {entries} entries, more than {MAX_ENTRIES}"
+            )));
+        }
+        let archive = ZipArchive::new(Cursor::new(bytes.clone())).map_err(zip_error)?;
+        let is_scan = |name: &&str| {
+            let hidden = name
+                .split('/')
+                .any(|part| part.starts_with('.') || part == "__MACOSX");
+            let lower = name.to_ascii_lowercase();
+            !hidden && (lower.ends_with(".gltf") || lower.ends_with(".glb"))
+        };
+        let mut scans: Vec<&str> = archive.file_names().filter(is_scan).collect();
+        scans.sort_unstable();
+        let main = match scans.as_slice() {
+            [main] => (*main).to_owned(),
+            [] => return Err(broken("it holds no .gltf and no .glb".into())),
+            [a, b, ..] => {
+                return Err(broken(format!(
+                    "it holds {} scans ({a:?}, {b:?}); send one at a time",
+                    scans.len()
+                )));
+            }
+        };
+        Ok(Self {
+            bytes,
+            main,
+            archive,
+        })
+    }
+
+    /// The glTF.
+    pub fn main(&self, allowance: &DecodeAllowance<'_>) -> Result<Bytes, ScanError> {
+        let main = self.entry(&self.main, allowance)?;
+        main.ok_or_else(|| broken(format!("{:?} is not there", self.main)))
+    }
+
+    /// The file at a path relative to the glTF.
+    pub fn sibling(
+        &self,
+        path: &str,
+        allowance: &DecodeAllowance<'_>,
+    ) -> Result<Option<Bytes>, ScanError> {
+        let folder = self.main.rsplit_once('/').map_or("", |(folder, _)| folder);
+        match relative(format!("{folder}/{path}").trim_start_matches('/')) {
+            Some(path) => self.entry(&path, allowance),
+            None => Ok(None),
+        }
+    }
+
+    /// The same zip with other bytes for the glTF; all other entries keep their compressed bytes.
+    pub fn with_main(&self, main: &[u8]) -> Result<Vec<u8>, ScanError> {
+        let mut archive = self.archive.clone();
+        let mut out = ZipWriter::new(Cursor::new(Vec::with_capacity(self.bytes.len())));
+        for index in 0..archive.len() {
+            let entry = archive.by_index_raw(index).map_err(zip_error)?;
+            if entry.name() != self.main {
+                out.raw_copy_file(entry).map_err(zip_error)?;
+                continue;
+            }
+            let method = match entry.compression() {
+                CompressionMethod::Stored => CompressionMethod::Stored,
+                _ => CompressionMethod::Deflated,
+            };
+            let options = SimpleFileOptions::default()
+                .compression_method(method)
+                .last_modified_time(entry.last_modified().unwrap_or_default())
+                .large_file(u32::try_from(main.len()).is_err());
+            drop(entry);
+            out.start_file(&self.main, options).map_err(zip_error)?;
+            out.write_all(main)
+                .map_err(|error| broken(error.to_string()))?;
+        }
+        Ok(out.finish().map_err(zip_error)?.into_inner())
+    }
+
+    fn entry(
+        &self,
+        name: &str,
+        allowance: &DecodeAllowance<'_>,
+    ) -> Result<Option<Bytes>, ScanError> {
+        let mut archive = self.archive.clone();
+        let Some(index) = archive.index_for_name(name) else {
+            return Ok(None);
+        };
+        let entry = archive.by_index(index).map_err(zip_error)?;
+        let (size, packed) = (entry.size(), entry.compressed_size());
+        if size > SMALL_ENTRY && size / MAX_RATIO > packed {
+            return Err(broken(format!(
+                "{name:?} unpacks from {packed} to {size} bytes, more than {MAX_RATIO} times as many"
+            )));
+        }
+        let length = usize::try_from(size).unwrap_or(usize::MAX);
+        allowance.take(length, "")?;
+        allowance
+            .budget
+            .spend_at_once(BYTE_WORK.saturating_mul(size))?;
+        let mut bytes = Vec::new();
+        // The declared size is only a claim: never more than it is read.
+        let read = entry.take(size.saturating_add(1)).read_to_end(&mut bytes);
+        read.map_err(|error| broken(format!("{name:?}: {error}")))?;
+        if bytes.len() != length {
+            return Err(broken(format!("{name:?} is not as long as the zip says")));
+        }
+        Ok(Some(bytes.into()))
+    }
+}
+
+fn zip_error(error: ZipError) -> ScanError {
+    broken(error.to_string())
+}
+
+fn broken(detail: String) -> ScanError {
+    ScanError::Container {
+        offset: 0,
+        detail: format!("the zip: {detail}"),
+    }
+}
