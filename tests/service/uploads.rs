@@ -1,8 +1,11 @@
 //! Request bodies: size, speed, number at once, media types; and connections whose peer is silent.
 
+use std::io::Write as _;
 use std::time::{Duration, Instant};
 
 use clap::Parser;
+use flate2::Compression;
+use flate2::write::{DeflateEncoder, GzEncoder, ZlibEncoder};
 use reqwest::multipart::{Form, Part};
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
@@ -94,14 +97,109 @@ async fn constraints_are_read_as_curl_sends_files() {
 }
 
 #[tokio::test]
-async fn a_compressed_body_is_refused() {
+async fn a_body_in_an_unknown_coding_is_refused() {
     let service = Service::start(&[]).await;
     let plain = service.scan("cloth").header("content-encoding", "identity");
     assert_eq!(plain.send().await.unwrap().status(), 200);
-    let packed = service.scan("cloth").header("content-encoding", "gzip");
+    let packed = service.scan("cloth").header("content-encoding", "br");
     let refused = packed.send().await.unwrap();
-    assert_eq!(refused.headers()["accept-encoding"], "identity");
+    assert_eq!(refused.headers()["accept-encoding"], "gzip, deflate");
     insta::assert_snapshot!("compressed", format!("{:#}", problem(refused).await));
+}
+
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(bytes).unwrap();
+    encoder.finish().unwrap()
+}
+
+fn zlib(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(bytes).unwrap();
+    encoder.finish().unwrap()
+}
+
+fn deflate(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = DeflateEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(bytes).unwrap();
+    encoder.finish().unwrap()
+}
+
+#[tokio::test]
+async fn compressed_bodies_are_read_within_the_body_limit() {
+    let service = Service::start(&["--body-limit", "1MiB"]).await;
+    let post = |coding: &'static str, body: Vec<u8>| {
+        let request = service.scan("cloth").header("content-encoding", coding);
+        async move { request.body(body).send().await.unwrap() }
+    };
+    for (coding, body) in [
+        ("gzip", gzip(b"cloth")),
+        ("gzip", [gzip(b"clo"), gzip(b"th")].concat()),
+        ("deflate", zlib(b"cloth")),
+        ("deflate", deflate(b"cloth")),
+    ] {
+        let answer = post(coding, body).await;
+        assert_eq!(answer.status(), 200, "{coding}");
+        assert!(
+            answer.bytes().await.unwrap().starts_with(b"glTF cloth"),
+            "{coding}"
+        );
+    }
+    let bomb = gzip(&vec![0; 64 << 20]);
+    assert!(bomb.len() < 1 << 20);
+    assert_eq!(post("gzip", bomb).await.status(), 413);
+    let mut broken = gzip(b"cloth");
+    broken.truncate(12);
+    assert_eq!(post("gzip", broken).await.status(), 400);
+}
+
+#[tokio::test]
+async fn a_body_without_a_media_type_is_told_by_its_first_bytes() {
+    let service = Service::start(&[]).await;
+    let url = format!("http://{}/inpaint", service.address);
+    let client = reqwest::Client::new();
+    let post = |media: Option<&'static str>, body: &'static [u8]| {
+        let request = client.post(&url).body(body);
+        let request = match media {
+            Some(media) => request.header("content-type", media),
+            None => request,
+        };
+        async move { request.send().await.unwrap().status().as_u16() }
+    };
+    let curl = "application/x-www-form-urlencoded";
+    for media in [None, Some("application/octet-stream"), Some(curl)] {
+        assert_eq!(post(media, b"glTF and more").await, 200);
+        assert_eq!(post(media, b"\xEF\xBB\xBF {\"asset\": 2}").await, 200);
+        assert_eq!(post(media, b"PK\x03\x04").await, 200);
+        assert_eq!(post(media, b"solid cloth").await, 415);
+        assert_eq!(post(media, b"").await, 400);
+    }
+    assert_eq!(post(Some("text/plain"), b"glTF").await, 415);
+}
+
+#[tokio::test]
+async fn files_of_a_scan_come_as_parts_named_by_their_uris() {
+    let service = Service::start(&[]).await;
+    let url = format!("http://{}/inpaint", service.address);
+    let send = |form: Form| {
+        let request = reqwest::Client::new().post(&url).multipart(form);
+        async move { request.send().await.unwrap() }
+    };
+    let scan = || Part::bytes(b"{}".to_vec());
+    let file = || Part::bytes(b"weft".to_vec());
+    let form = Form::new()
+        .part("scan", scan())
+        .part("maps/cloth%20plaid.png", file());
+    let answer = send(form.part("cloth.bin", file())).await;
+    // The fake sends back what it was given.
+    let bytes = answer.bytes().await.unwrap();
+    assert!(bytes.starts_with(b"glTF PK\x03\x04"));
+    let has = |name: &[u8]| bytes.windows(name.len()).any(|at| at == name);
+    assert!(has(b"maps/cloth%20plaid.png") && has(b"cloth.bin") && has(b"scan.gltf"));
+    let nameless = send(Form::new().part("scan", scan()).part("clothbin", file())).await;
+    assert_eq!(nameless.status(), 400);
+    let twice = Form::new().part("scan", scan()).part("a.bin", file());
+    assert_eq!(send(twice.part("a.bin", file())).await.status(), 400);
 }
 
 #[tokio::test]

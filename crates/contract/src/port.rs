@@ -17,7 +17,7 @@ pub struct HolesQuery {
 /// A mended scan and its report.
 #[derive(Debug, Clone)]
 pub struct Mended {
-    /// The glTF, in the container of the input: GLB or JSON.
+    /// The glTF, in the container of the input: GLB, JSON, or a zip with its files.
     pub bytes: Vec<u8>,
     /// The media type of that container.
     pub media_type: &'static str,
@@ -27,7 +27,7 @@ pub struct Mended {
 
 /// Mends scans. Called from many worker threads at once; every call blocks until it is done, or until its budget is exhausted: a mender
 /// asks it in every loop whose length the input decides, and after a cancellation it returns any refusal, which nobody reads. `scan` holds the bytes of a GLB, or of a
-/// glTF JSON with data URIs; they are shared with the request, not copied.
+/// glTF JSON with data URIs, or of a zip with a glTF and its files; they are shared with the request, not copied.
 pub trait Mender: Send + Sync + 'static {
     /// Fills the selected holes.
     ///
@@ -39,6 +39,19 @@ pub trait Mender: Send + Sync + 'static {
         constraints: &Constraints,
         budget: &Budget<'_>,
     ) -> Result<Mended, Refusal>;
+
+    /// A mended scan in another form. Only scans that came as a zip have one.
+    ///
+    /// # Errors
+    /// `Exhausted`; a file is missing that a GLB must hold.
+    fn repacked(
+        &self,
+        mended: Mended,
+        _form: ScanForm,
+        _budget: &Budget<'_>,
+    ) -> Result<Mended, Refusal> {
+        Ok(mended)
+    }
 
     /// Searches the uv of a hole's grid at which an anchor takes the cloth closest to a point in scene space.
     ///
@@ -127,6 +140,17 @@ pub trait EditSession: Send + Sync + 'static {
         search: &Search,
         budget: &Budget<'_>,
     ) -> Result<v1::AnchorFound, Refusal>;
+}
+
+/// The form of a scan that came as a zip with a glTF and its files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ScanForm {
+    /// A zip again.
+    AsReceived,
+    /// The glTF alone, which goes on referring to its files.
+    Gltf,
+    /// One GLB with all files in it.
+    Glb,
 }
 
 /// How patches are sent.

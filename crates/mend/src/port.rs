@@ -5,9 +5,11 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use darn_budget::Budget;
-use darn_contract::port::{EditSession, HolesQuery, Mended, Mender, PatchForm, Patches, Refusal};
+use darn_contract::port::{
+    EditSession, HolesQuery, Mended, Mender, PatchForm, Patches, Refusal, ScanForm,
+};
 use darn_contract::{Constraints, Search, error_chain, v1};
-use darn_gltf_scan::Scan;
+use darn_gltf_scan::{Container, Scan, repacked};
 
 use crate::error::MendError;
 use crate::mender::{Call, NetworkMender};
@@ -50,6 +52,28 @@ impl Mender for SharedMender {
             let mut mended = crate::mend(&scan, constraints, self.call(budget)).map_err(refusal)?;
             add_read_time(&mut mended.report.timings, read);
             Ok(mended)
+        })
+    }
+
+    fn repacked(
+        &self,
+        mended: Mended,
+        form: ScanForm,
+        budget: &Budget<'_>,
+    ) -> Result<Mended, Refusal> {
+        let container = match form {
+            _ if mended.media_type != Container::Zip.media_type() => return Ok(mended),
+            ScanForm::AsReceived => return Ok(mended),
+            ScanForm::Gltf => Container::Gltf,
+            ScanForm::Glb => Container::Glb,
+        };
+        let limits = &self.0.scan_limits;
+        let (container, bytes) = repacked(mended.bytes, container, limits, budget)
+            .map_err(|error| refusal(MendError::unreadable(error)))?;
+        Ok(Mended {
+            bytes,
+            media_type: container.media_type(),
+            report: mended.report,
         })
     }
 

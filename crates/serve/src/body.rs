@@ -1,6 +1,6 @@
 //! Reads a request's body within its limits, and finds in it the scan and the parameters: constraints or a query.
 
-use std::{error::Error, future::poll_fn, pin::Pin};
+use std::{collections::BTreeMap, error::Error, future::poll_fn, pin::Pin};
 
 use axum::{
     body::{Body, HttpBody},
@@ -12,11 +12,13 @@ use tokio::time::{Duration, Instant, timeout, timeout_at};
 
 use super::{
     app::{App, RequestLimits, UploadPermit},
+    content_coding::ContentCoding,
     counted::{CountedBytes, counted, take},
     error::RequestError,
-    media_types::{FORM_DATA, GLB, GLTF, JSON, OCTET_STREAM},
+    media_types::{FORM_DATA, FORM_URLENCODED, GLB, GLTF, JSON, OCTET_STREAM, ZIP},
     pace::{PaceLimits, TooSlow},
     parameters::{self, Parameters},
+    scan_files::{self, ScanFiles, looks_like_a_scan},
 };
 use darn_contract::{Constraints, FieldError, cut};
 
@@ -25,17 +27,20 @@ const DRAIN_FACTOR: u64 = 4;
 /// Longest time for which an unwanted body is read and dropped.
 const DRAIN_TIME: Duration = Duration::from_secs(2);
 /// The media types of a body with a scan, for an error's text.
-const SCAN_BODY_MEDIA_TYPES: &str = "model/gltf-binary, model/gltf+json or multipart/form-data";
+const SCAN_BODY_MEDIA_TYPES: &str =
+    "model/gltf-binary, model/gltf+json, application/zip or multipart/form-data";
 /// The media types of the part `scan`, for an error's text.
-const SCAN_PART_MEDIA_TYPES: &str = "model/gltf-binary or model/gltf+json";
+const SCAN_PART_MEDIA_TYPES: &str = "model/gltf-binary, model/gltf+json or application/zip";
 /// The media types that the part `scan` is read from. `application/octet-stream` is what curl declares for any file.
-const SCAN_PART_READ: [&str; 3] = [GLB, GLTF, OCTET_STREAM];
+const SCAN_PART_READ: [&str; 4] = [GLB, GLTF, ZIP, OCTET_STREAM];
 
 /// A request with a scan.
 #[derive(Debug)]
 pub struct ScanRequest<P> {
-    /// The scan's bytes; not empty.
+    /// The scan's bytes; not empty. A zip when it came in several files.
     pub scan: Bytes,
+    /// In how many files it came.
+    pub files: ScanFiles,
     /// Checked constraints or query; `None` when the request carries none.
     pub parameters: Option<P>,
     /// Allows the request to queue its job.
@@ -107,6 +112,8 @@ impl BodyTimer {
 enum ScanBody {
     /// The body is the scan.
     Bare,
+    /// The body is the scan if its first bytes say so: no media type says what it is.
+    Untold,
     /// The scan is a part of multipart/form-data.
     Form,
 }
@@ -137,18 +144,29 @@ async fn read_scan<P: Parameters>(
     let (parts, body) = request.into_parts();
     let check_headers = || {
         let kind = scan_body(&parts.headers)?;
-        check_encoding(&parts.headers)?;
         check_length(&parts.headers, limits.body)?;
         Ok(kind)
     };
     let (kind, bytes) = read_body(&parts, body, limits, check_headers).await?;
-    let (scan, parameters) = match kind {
-        ScanBody::Bare => (bytes, None),
+    let (scan, files, parameters) = match kind {
+        ScanBody::Untold if !bytes.is_empty() && !looks_like_a_scan(&bytes) => {
+            return Err(unsupported(&parts.headers, SCAN_BODY_MEDIA_TYPES));
+        }
+        ScanBody::Bare | ScanBody::Untold => {
+            let files = ScanFiles::of(&bytes);
+            (bytes, files, None)
+        }
         ScanBody::Form => {
             // Splitting copies the parts.
             let memory = take(&limits.memory, bytes.len())?;
-            let (scan, parameters) = split_form(parts, bytes).await?;
-            (counted(scan, memory), parameters)
+            let form = split_form(parts, bytes).await?;
+            if form.files.is_empty() {
+                let files = ScanFiles::of(&form.scan);
+                (counted(form.scan, memory), files, form.parameters)
+            } else {
+                let zip = scan_files::bundle(form.scan, form.files, &limits.memory).await?;
+                (zip, ScanFiles::Parts, form.parameters)
+            }
         }
     };
     if scan.is_empty() {
@@ -156,6 +174,7 @@ async fn read_scan<P: Parameters>(
     }
     Ok(ScanRequest {
         scan,
+        files,
         parameters,
         upload,
     })
@@ -175,7 +194,6 @@ pub async fn read_parameters<P: Parameters>(
         ..limits.clone()
     };
     let check_headers = || {
-        check_encoding(&parts.headers)?;
         check_length(&parts.headers, limits.body)?;
         match essence(content_type(&parts.headers)).as_str() {
             "" => Ok(false),
@@ -209,7 +227,13 @@ async fn read_body<T>(
 ) -> Result<(T, Bytes), RequestError> {
     let read = async {
         let checked = check_headers()?;
-        Ok((checked, read_bytes(&mut body, limits).await?))
+        let coding = ContentCoding::of(&parts.headers)?;
+        let bytes = read_bytes(&mut body, limits).await?;
+        let bytes = match coding {
+            Some(coding) => coding.decode(bytes, limits).await?,
+            None => bytes,
+        };
+        Ok((checked, bytes))
     };
     let outcome = read.await;
     if outcome
@@ -247,7 +271,8 @@ fn discard_body(headers: &HeaderMap, mut body: Body, limits: &RequestLimits) {
 
 fn scan_body(headers: &HeaderMap) -> Result<ScanBody, RequestError> {
     match essence(content_type(headers)).as_str() {
-        GLB | GLTF => Ok(ScanBody::Bare),
+        GLB | GLTF | ZIP => Ok(ScanBody::Bare),
+        "" | OCTET_STREAM | FORM_URLENCODED => Ok(ScanBody::Untold),
         FORM_DATA => Ok(ScanBody::Form),
         _ => Err(unsupported(headers, SCAN_BODY_MEDIA_TYPES)),
     }
@@ -271,23 +296,6 @@ fn unsupported(headers: &HeaderMap, send: &'static str) -> RequestError {
         got => format!("`{}`", cut(got, 100)),
     };
     RequestError::UnsupportedMediaType { got, send }
-}
-
-/// Refuses a compressed body, which would otherwise be read as a broken scan.
-fn check_encoding(headers: &HeaderMap) -> Result<(), RequestError> {
-    for value in headers.get_all(header::CONTENT_ENCODING) {
-        let got = value.to_str().unwrap_or("(not text)");
-        let is_unknown = |coding: &str| {
-            let coding = coding.trim();
-            !coding.is_empty() && !coding.eq_ignore_ascii_case("identity")
-        };
-        if got.split(',').any(is_unknown) {
-            return Err(RequestError::ContentEncoding {
-                got: cut(got, 100).into_owned(),
-            });
-        }
-    }
-    Ok(())
 }
 
 /// Refuses a body that its `content-length` declares too large.
@@ -326,11 +334,18 @@ async fn next_piece(body: &mut Body) -> Option<Result<Bytes, axum::Error>> {
     }
 }
 
-/// The parts of multipart/form-data: the scan and, if there are any, the parameters.
+/// The parts of multipart/form-data.
+struct FormParts<P> {
+    scan: Bytes,
+    /// The files that the scan refers to, by their URIs.
+    files: BTreeMap<String, Bytes>,
+    parameters: Option<P>,
+}
+
 async fn split_form<P: Parameters>(
     parts: Parts,
     bytes: Bytes,
-) -> Result<(Bytes, Option<P>), RequestError> {
+) -> Result<FormParts<P>, RequestError> {
     let malformed = |error: MultipartError| {
         RequestError::Malformed(format!("the multipart body: {}", error.body_text()))
     };
@@ -340,37 +355,43 @@ async fn split_form<P: Parameters>(
     let mut form = (Multipart::from_request(request, &()).await).map_err(|rejection| {
         RequestError::Malformed(format!("the multipart body: {}", rejection.body_text()))
     })?;
-    let mut scan = None;
-    let mut parameters = None;
+    let mut named: BTreeMap<String, Bytes> = BTreeMap::new();
     while let Some(field) = form.next_field().await.map_err(malformed)? {
         let name = field.name().unwrap_or_default().to_owned();
         let media_type = field.content_type().map(essence);
-        let (slot, expected, read): (_, _, &[&str]) = match name.as_str() {
-            "scan" => (&mut scan, SCAN_PART_MEDIA_TYPES, &SCAN_PART_READ),
-            part if part == P::PART => (&mut parameters, JSON, &parameters::MEDIA_TYPES),
+        let (expected, read): (_, &[&str]) = match name.as_str() {
+            "scan" => (SCAN_PART_MEDIA_TYPES, &SCAN_PART_READ),
+            part if part == P::PART => (JSON, &parameters::MEDIA_TYPES),
+            // A file that the scan refers to; the scan knows its type.
+            part if part.contains('.') => ("", &[]),
             _ => {
                 return Err(RequestError::Malformed(format!(
-                    "there is no part `{}`; the parts are `scan` and `{}`",
+                    "there is no part `{}`; the parts are `scan`, `{}`, and files of the scan, each named by its URI there",
                     cut(&name, 100),
                     P::PART
                 )));
             }
         };
-        if let Some(media_type) = media_type.filter(|it| !read.contains(&it.as_str())) {
+        let unread = |it: &String| !read.is_empty() && !read.contains(&it.as_str());
+        if let Some(media_type) = media_type.filter(unread) {
             return Err(RequestError::UnsupportedMediaType {
                 got: format!("`{}` of part `{name}`", cut(&media_type, 100)),
                 send: expected,
             });
         }
-        if slot
-            .replace(field.bytes().await.map_err(malformed)?)
-            .is_some()
-        {
+        let bytes = field.bytes().await.map_err(malformed)?;
+        if named.insert(name.clone(), bytes).is_some() {
             return Err(RequestError::Malformed(format!(
-                "the part `{name}` comes twice"
+                "the part `{}` comes twice",
+                cut(&name, 100)
             )));
         }
     }
+    let parameters = named.remove(P::PART);
     let parameters = parameters.map(|text| P::parse(&text)).transpose()?;
-    Ok((scan.ok_or(RequestError::EmptyBody)?, parameters))
+    Ok(FormParts {
+        scan: named.remove("scan").ok_or(RequestError::EmptyBody)?,
+        files: named,
+        parameters,
+    })
 }

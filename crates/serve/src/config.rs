@@ -272,8 +272,11 @@ fn size(text: &str) -> Result<usize, String> {
     }
 }
 
-/// `30s`, `500ms`, `2m`.
-fn duration(text: &str) -> Result<Duration, String> {
+/// A time with its unit, such as `30s`: whole milliseconds (`ms`), seconds (`s`) or minutes (`m`), from 1 ms to a year.
+///
+/// # Errors
+/// What a text must be instead.
+pub fn duration(text: &str) -> Result<Duration, String> {
     let (number, unit) = split(text);
     let milliseconds: u64 = match unit {
         "ms" => 1,

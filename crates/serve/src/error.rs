@@ -70,8 +70,8 @@ pub enum RequestError {
         /// Those that are read.
         send: &'static str,
     },
-    /// The body is compressed.
-    #[error("content encoding `{got}` is not read here; send the body as it is")]
+    /// The body is compressed in a way that is not read.
+    #[error("content encoding `{got}` is not read here; send gzip, deflate, or the body as it is")]
     ContentEncoding {
         /// The one received.
         got: String,

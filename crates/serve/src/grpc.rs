@@ -17,6 +17,7 @@ use super::{
     counted::CountedBytes,
     error::RequestError,
     parameters::Parameters,
+    scan_files::ScanFiles,
     telemetry::RequestId,
     uploads::BodySize,
 };
@@ -101,6 +102,7 @@ impl GrpcService {
             scan,
             parameters,
             upload,
+            ..
         } = self.receive::<Constraints>(request).await?;
         let constraints = parameters.unwrap_or_default();
         let mended = self
@@ -121,6 +123,7 @@ impl GrpcService {
             scan,
             parameters,
             upload,
+            ..
         } = self.receive::<Search>(request).await?;
         let place = "the field `query` of the first chunk";
         let search = parameters.ok_or(RequestError::NoQuery { place })?;
@@ -172,8 +175,10 @@ impl GrpcService {
         if scan.len() == 0 {
             return Err(RequestError::EmptyBody);
         }
+        let scan = scan.freeze();
         Ok(ScanRequest {
-            scan: scan.freeze(),
+            files: ScanFiles::of(&scan),
+            scan,
             parameters,
             upload,
         })

@@ -13,6 +13,7 @@ mod client_address;
 mod config;
 mod connection_table;
 mod connections;
+mod content_coding;
 mod counted;
 mod ended_sessions;
 mod error;
@@ -36,6 +37,7 @@ mod problem;
 mod request_body;
 mod response;
 mod routes;
+mod scan_files;
 mod schema;
 mod session_routes;
 mod session_store;
@@ -60,7 +62,7 @@ use tracing::{error, info};
 
 pub use self::{
     app::App,
-    config::ServeArgs,
+    config::{ServeArgs, duration},
     healthcheck::{HealthError, healthcheck},
     log_queue::{LogGuard, write_to_stderr},
     telemetry::{LogDelivery, LogError, LogFormat, start_logging},

@@ -4,12 +4,16 @@
 pub const GLB: &str = "model/gltf-binary";
 /// A glTF as JSON.
 pub const GLTF: &str = "model/gltf+json";
+/// A zip with a glTF and the files that it refers to.
+pub const ZIP: &str = "application/zip";
 /// JSON.
 pub const JSON: &str = "application/json";
 /// Bytes of no stated type: positions in answers; what curl declares for any file in requests.
 pub const OCTET_STREAM: &str = "application/octet-stream";
 /// A report and what was mended, in one answer.
 pub const MULTIPART_MIXED: &str = "multipart/mixed";
+/// What curl declares for a body of which it is told nothing.
+pub const FORM_URLENCODED: &str = "application/x-www-form-urlencoded";
 /// A scan and its constraints or query, in one request.
 pub const FORM_DATA: &str = "multipart/form-data";
 /// A problem document (RFC 9457).

@@ -7,7 +7,9 @@ use bytes::Bytes;
 use serde_json::{Map, Value, json};
 
 use super::{
-    media_types::{FORM_DATA, GLB, GLTF, JSON, MULTIPART_MIXED, PROBLEM_JSON, TEXT},
+    media_types::{
+        FORM_DATA, GLB, GLTF, JSON, MULTIPART_MIXED, OCTET_STREAM, PROBLEM_JSON, TEXT, ZIP,
+    },
     response, schema,
 };
 
@@ -63,7 +65,13 @@ fn inpaint() -> Value {
         "requestBody": body(&[("constraints", "Constraints")], &[]),
         "responses": responses(
             "200",
-            mended("The mended scan, in the container of the input", "scan", &[GLB, GLTF]),
+            mended(
+                "The mended scan, in the container of the input. One that came with its files goes back as a zip (from a zip) or as the \
+                    glTF alone (from parts), or as `Accept` prefers: application/zip, model/gltf+json, or model/gltf-binary for one GLB with \
+                    all files in it",
+                "scan",
+                &[GLB, GLTF, ZIP],
+            ),
             "A scan or constraints that cannot be mended; `errors` names the constraints. With code `no_holes`: the scan has no \
                 hole to fill",
         ),
@@ -72,14 +80,14 @@ fn inpaint() -> Value {
 
 fn optimize_anchor() -> Value {
     let mut found = found();
-    let mended = mended("", "scan", &[GLB, GLTF]);
+    let mended = mended("", "scan", &[GLB, GLTF, ZIP]);
     found["description"] = format!(
         "{}. With `Accept: model/gltf-binary`: the scan mended with that anchor, in the container of the input; with \
             `Accept: multipart/mixed`: the part `report` (application/json, schema Report), then the part `scan`",
         found["description"].as_str().unwrap_or_default()
     )
     .into();
-    for media_type in [GLB, GLTF, MULTIPART_MIXED] {
+    for media_type in [GLB, GLTF, ZIP, MULTIPART_MIXED] {
         found["content"][media_type] = mended["content"][media_type].clone();
     }
     json!({
@@ -153,8 +161,9 @@ fn holes() -> Value {
 
 /// A request body with a scan: alone, or with other parts in multipart/form-data; only as the latter when one of them is required.
 fn body(beside: &[(&str, &str)], required: &[&str]) -> Value {
-    let mut parts = json!({ "scan": { "description": "GLB, or glTF with data URIs" } });
-    let mut encoding = json!({ "scan": { "contentType": "model/gltf-binary, model/gltf+json, application/octet-stream" } });
+    let mut parts = json!({ "scan": { "description": "GLB; glTF, with further parts for the files that it refers to, each named by its URI \
+        in the glTF; or a zip with a glTF and its files" } });
+    let mut encoding = json!({ "scan": { "contentType": "model/gltf-binary, model/gltf+json, application/zip, application/octet-stream" } });
     for (part, schema) in beside {
         parts[*part] = reference(schema);
         encoding[*part] = json!({ "contentType": "application/json, application/octet-stream" });
@@ -165,7 +174,7 @@ fn body(beside: &[(&str, &str)], required: &[&str]) -> Value {
         "encoding": encoding,
     });
     let content = if required.is_empty() {
-        json!({ GLB: {}, GLTF: {}, FORM_DATA: form })
+        json!({ GLB: {}, GLTF: {}, ZIP: {}, OCTET_STREAM: {}, FORM_DATA: form })
     } else {
         json!({ FORM_DATA: form })
     };

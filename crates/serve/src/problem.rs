@@ -58,7 +58,7 @@ impl RequestError {
             // RFC 7694: the encodings that are read.
             headers.insert(
                 header::ACCEPT_ENCODING,
-                HeaderValue::from_static("identity"),
+                HeaderValue::from_static("gzip, deflate"),
             );
         }
         let body = serde_json::to_vec(&self.document(request_id)).unwrap_or_default();

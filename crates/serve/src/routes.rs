@@ -23,9 +23,10 @@ use super::{
     body::{self, ScanRequest},
     counted::counted_answer,
     error::RequestError,
-    media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, PROMETHEUS},
+    media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, PROMETHEUS, ZIP},
     openapi, parameters,
     response::{self, ANCHOR_DISTANCE, HOLES_FILLED, LOOPS_SKIPPED, MendResponse, RESULT},
+    scan_files::AnswerForm,
     session_routes,
     telemetry::{REQUEST_ID, RequestId},
 };
@@ -75,6 +76,7 @@ fn cors(origins: &[String]) -> CorsLayer {
         .allow_headers([
             header::ACCEPT,
             header::AUTHORIZATION,
+            header::CONTENT_ENCODING,
             header::CONTENT_TYPE,
             REQUEST_ID,
         ])
@@ -146,16 +148,19 @@ async fn observe(State(app): State<Arc<App>>, mut request: Request, next: Next) 
 }
 
 async fn inpaint(State(app): State<Arc<App>>, request: Request) -> Result<Response, RequestError> {
-    let media_type = preferred(request.headers(), &[GLB, GLTF, MULTIPART_MIXED]);
+    let headers = request.headers().clone();
     let ScanRequest {
         scan,
+        files,
         parameters,
         upload,
     } = body::receive_scan::<Constraints>(&app, request).await?;
     let constraints = parameters.unwrap_or_default();
+    let AnswerForm { media_type, form } = files.answer(&headers);
     let service = Arc::clone(&app);
     app.submit(upload, scan.len(), move |mender, budget| {
         let mended = mender.inpaint(scan, &constraints, budget)?;
+        let mended = mender.repacked(mended, form, budget)?;
         Ok(MendResponse::from(mended).render(media_type, &service.metrics))
     })
     .await
@@ -183,15 +188,16 @@ async fn optimize_anchor(
     State(app): State<Arc<App>>,
     request: Request,
 ) -> Result<Response, RequestError> {
-    let media_type = preferred(request.headers(), &[JSON, GLB, GLTF, MULTIPART_MIXED]);
+    let headers = request.headers().clone();
     let ScanRequest {
         scan,
+        files,
         parameters,
         upload,
     } = body::receive_scan::<Search>(&app, request).await?;
     let place = "the part `query` of multipart/form-data, beside the part `scan`";
     let search = parameters.ok_or(RequestError::NoQuery { place })?;
-    if media_type == JSON {
+    if preferred(&headers, &[JSON, GLB, GLTF, ZIP, MULTIPART_MIXED]) == JSON {
         let text = app
             .submit(upload, scan.len(), move |mender, budget| {
                 let found = mender.optimize_anchor(scan, &search, budget)?;
@@ -200,9 +206,11 @@ async fn optimize_anchor(
             .await?;
         return Ok(response::json_response(text));
     }
+    let AnswerForm { media_type, form } = files.answer(&headers);
     let service = Arc::clone(&app);
     app.submit(upload, scan.len(), move |mender, budget| {
         let mended = mender.mend_to_target(scan, &search, budget)?;
+        let mended = mender.repacked(mended, form, budget)?;
         Ok(MendResponse::from(mended).render(media_type, &service.metrics))
     })
     .await

@@ -56,6 +56,7 @@ async fn open(State(app): State<Arc<App>>, request: Request) -> Result<Response,
         scan,
         parameters,
         upload,
+        ..
     } = body::receive_scan::<Constraints>(&app, request).await?;
     let constraints = parameters::only_selection(parameters.unwrap_or_default())?;
     let (id, sessions) = (Uuid::new_v4(), Arc::clone(&app.sessions));

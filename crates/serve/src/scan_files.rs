@@ -1,0 +1,173 @@
+//! Scans that come in several files: how they travel to the mender as one zip, and in which form the mended scan goes back.
+
+use std::{
+    collections::BTreeMap,
+    io::{Cursor, Write as _},
+    sync::Arc,
+};
+
+use axum::http::HeaderMap;
+use bytes::Bytes;
+use tokio::task;
+use zip::{CompressionMethod, ZipWriter, result::ZipError, write::SimpleFileOptions};
+
+use super::{
+    accept::preferred,
+    counted::{counted, take},
+    error::RequestError,
+    media_types::{GLB, GLTF, MULTIPART_MIXED, ZIP},
+};
+use darn_budget::MemoryPool;
+use darn_contract::{cut, port::ScanForm};
+
+/// The first bytes of a zip.
+const ZIP_MAGIC: &[u8] = b"PK\x03\x04";
+
+/// In how many files a scan came.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ScanFiles {
+    /// In one: GLB, or glTF with data URIs.
+    One,
+    /// In a zip.
+    Zip,
+    /// In parts of multipart/form-data.
+    Parts,
+}
+
+/// The form of an answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AnswerForm {
+    /// Its media type, or multipart/mixed.
+    pub media_type: &'static str,
+    /// The form of the scan in it.
+    pub form: ScanForm,
+}
+
+impl ScanFiles {
+    /// What a body or the part `scan` alone is.
+    pub fn of(scan: &[u8]) -> Self {
+        if scan.starts_with(ZIP_MAGIC) {
+            Self::Zip
+        } else {
+            Self::One
+        }
+    }
+
+    /// The form of the answer that the caller prefers. Without a preference a scan goes back as it came, but of one that came in parts the
+    /// glTF alone: its other files stay as they are.
+    pub fn answer(self, headers: &HeaderMap) -> AnswerForm {
+        let offered: &[&'static str] = match self {
+            Self::One => &[GLB, GLTF, MULTIPART_MIXED],
+            Self::Zip => &[ZIP, GLB, GLTF, MULTIPART_MIXED],
+            Self::Parts => &[GLTF, GLB, ZIP, MULTIPART_MIXED],
+        };
+        let media_type = preferred(headers, offered);
+        let form = match (self, media_type) {
+            (Self::One, _) | (_, ZIP) | (Self::Zip, MULTIPART_MIXED) => ScanForm::AsReceived,
+            (_, GLB) => ScanForm::Glb,
+            _ => ScanForm::Gltf,
+        };
+        AnswerForm { media_type, form }
+    }
+}
+
+/// Whether bytes begin as a GLB, a zip, or a JSON object does.
+pub fn looks_like_a_scan(bytes: &[u8]) -> bool {
+    let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+    bytes.starts_with(b"glTF")
+        || bytes.starts_with(ZIP_MAGIC)
+        || text.trim_ascii_start().starts_with(b"{")
+}
+
+/// A zip of a scan and the files that it refers to, by their URIs, stored as they are. It goes no further than to the mender.
+///
+/// # Errors
+/// `MemoryFull`; `Malformed` for a scan that is a zip itself, or a file with a name that a zip cannot have.
+pub async fn bundle(
+    scan: Bytes,
+    files: BTreeMap<String, Bytes>,
+    pool: &Arc<MemoryPool>,
+) -> Result<Bytes, RequestError> {
+    if ScanFiles::of(&scan) == ScanFiles::Zip {
+        let text = "a scan that is a zip holds its files itself; send no others beside it";
+        return Err(RequestError::Malformed(text.to_owned()));
+    }
+    // A name stands twice in a zip, and an entry's headers take about a hundred bytes.
+    let entries = files
+        .iter()
+        .map(|(name, bytes)| 2 * name.len() + 256 + bytes.len());
+    let length = entries.sum::<usize>() + scan.len() + (4 << 10);
+    let memory = take(pool, length)?;
+    let zip = task::spawn_blocking(move || stored(&scan, &files, length)).await;
+    let zip = zip.unwrap_or(Err(RequestError::Internal))?;
+    Ok(counted(zip.into(), memory))
+}
+
+/// The zip, of about `length` bytes.
+fn stored(
+    scan: &[u8],
+    files: &BTreeMap<String, Bytes>,
+    length: usize,
+) -> Result<Vec<u8>, RequestError> {
+    let main = if scan.starts_with(b"glTF") {
+        "scan.glb"
+    } else {
+        "scan.gltf"
+    };
+    let mut zip = ZipWriter::new(Cursor::new(Vec::with_capacity(length)));
+    let entries = files
+        .iter()
+        .map(|(name, bytes)| (name.as_str(), bytes.as_ref()));
+    for (name, bytes) in entries.chain([(main, scan)]) {
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Stored)
+            .large_file(u32::try_from(bytes.len()).is_err());
+        let written = zip.start_file(name, options);
+        let written = written.and_then(|()| zip.write_all(bytes).map_err(ZipError::Io));
+        written.map_err(|error| malformed(name, &error))?;
+    }
+    let zip = zip.finish().map_err(|error| malformed(main, &error))?;
+    Ok(zip.into_inner())
+}
+
+fn malformed(name: &str, error: &ZipError) -> RequestError {
+    RequestError::Malformed(format!("the file `{}`: {error}", cut(name, 100)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use axum::http::{HeaderValue, header};
+
+    #[test]
+    fn answers_go_back_as_scans_came_unless_the_caller_prefers_otherwise() {
+        let answer = |files: ScanFiles, accept: Option<&'static str>| {
+            let accept = accept.map(|accept| (header::ACCEPT, HeaderValue::from_static(accept)));
+            let form = files.answer(&HeaderMap::from_iter(accept));
+            (form.media_type, form.form)
+        };
+        use ScanForm::{AsReceived, Glb, Gltf};
+        for (files, accept, expected) in [
+            (ScanFiles::One, None, (GLB, AsReceived)),
+            (ScanFiles::One, Some(GLTF), (GLTF, AsReceived)),
+            (ScanFiles::Zip, None, (ZIP, AsReceived)),
+            (ScanFiles::Zip, Some("*/*"), (ZIP, AsReceived)),
+            (ScanFiles::Zip, Some(GLB), (GLB, Glb)),
+            (
+                ScanFiles::Zip,
+                Some(MULTIPART_MIXED),
+                (MULTIPART_MIXED, AsReceived),
+            ),
+            (ScanFiles::Parts, None, (GLTF, Gltf)),
+            (ScanFiles::Parts, Some(GLB), (GLB, Glb)),
+            (ScanFiles::Parts, Some(ZIP), (ZIP, AsReceived)),
+            (
+                ScanFiles::Parts,
+                Some(MULTIPART_MIXED),
+                (MULTIPART_MIXED, Gltf),
+            ),
+        ] {
+            assert_eq!(answer(files, accept), expected, "{files:?}, {accept:?}");
+        }
+    }
+}
