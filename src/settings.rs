@@ -1,8 +1,10 @@
 //! Settings that several commands share, and those of `darn serve` beside the service's own in `darn-serve`.
 
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
+use darn_budget::{Budget, Limits};
 use darn_gltf_scan::ScanLimits;
 use darn_serve::ServeArgs;
 
@@ -17,6 +19,16 @@ pub struct ServeCommand {
     #[arg(long, env = "DARN_THREADS", value_name = "N", value_parser = threads)]
     pub threads: Option<usize>,
 
+    #[command(flatten)]
+    pub size: SizeArgs,
+
+    #[command(flatten)]
+    pub network: NetworkArgs,
+}
+
+/// The limits of a scan's size.
+#[derive(Debug, Clone, Args)]
+pub struct SizeArgs {
     /// Most triangles a scan may have
     #[arg(long, env = "DARN_MAX_FACES", value_name = "N", default_value = "4000000", value_parser = count)]
     pub max_faces: usize,
@@ -24,19 +36,35 @@ pub struct ServeCommand {
     /// Most vertices a scan may have, as its files count them: one that a texture seam splits counts twice
     #[arg(long, env = "DARN_MAX_VERTICES", value_name = "N", default_value = "2000000", value_parser = count)]
     pub max_vertices: usize,
-
-    #[command(flatten)]
-    pub network: NetworkArgs,
 }
 
-impl ServeCommand {
-    /// The limits of a scan's size.
-    pub fn scan_limits(&self) -> ScanLimits {
+impl SizeArgs {
+    /// The limits.
+    pub fn limits(&self) -> ScanLimits {
         ScanLimits {
             max_faces: self.max_faces,
             max_vertices: self.max_vertices,
             ..ScanLimits::default()
         }
+    }
+}
+
+/// How long a command may take.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct DeadlineArgs {
+    /// Longest time that the work may take, such as 30s; left out, as long as it takes
+    #[arg(long, value_name = "TIME", value_parser = darn_serve::duration)]
+    pub deadline: Option<Duration>,
+}
+
+impl DeadlineArgs {
+    /// A budget that ends so long from now.
+    pub fn budget(self) -> Budget<'static> {
+        let limits = Limits {
+            deadline: self.deadline.map(|length| Instant::now() + length),
+            ..Limits::default()
+        };
+        Budget::new(limits, &|| false)
     }
 }
 

@@ -159,3 +159,74 @@ fn samples_are_fixed_size_records_that_depend_on_the_seed_alone() {
     let missing = darn().args(["samples", "--sheets", "/nowhere"]).output();
     assert_eq!(missing.expect("darn runs").status.code(), Some(1));
 }
+
+/// The example as glTF with its buffer beside it, in `folder`; returns the glTF's path.
+fn separate(folder: &std::path::Path) -> std::path::PathBuf {
+    let length = |at: usize| u32::from_le_bytes(EXAMPLE[at..at + 4].try_into().unwrap()) as usize;
+    let end = 20 + length(12);
+    let mut json: serde_json::Value = serde_json::from_slice(&EXAMPLE[20..end]).expect("JSON");
+    json["buffers"][0]["uri"] = "bins/my%20scarf.bin".into();
+    std::fs::create_dir_all(folder.join("bins")).expect("a folder");
+    std::fs::write(folder.join("bins/my scarf.bin"), &EXAMPLE[end + 8..]).expect("written");
+    let scan = folder.join("scarf.gltf");
+    std::fs::write(&scan, json.to_string()).expect("written");
+    scan
+}
+
+#[test]
+fn a_scan_of_several_files_is_mended_as_its_glb() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scan = separate(folder.path());
+    let glb = folder.path().join("scarf.glb");
+    std::fs::write(&glb, EXAMPLE).expect("written");
+    let holes = |scan: &std::path::Path| {
+        let found = darn().arg("holes").arg(scan).output().expect("darn runs");
+        assert!(
+            found.status.success(),
+            "{}",
+            String::from_utf8_lossy(&found.stderr)
+        );
+        found.stdout
+    };
+    assert_eq!(holes(&scan), holes(&glb));
+    let mend = |scan: &std::path::Path, out: &str| {
+        let out = folder.path().join(out);
+        std::fs::create_dir_all(out.parent().expect("a folder")).expect("made");
+        let mended = darn().arg("inpaint").arg(scan).arg("-o").arg(&out).status();
+        assert!(mended.expect("darn runs").success());
+        holes(&out)
+    };
+    let expected = mend(&glb, "mended.glb");
+    // Beside its files; in another folder, where they follow it; and as one file.
+    assert_eq!(mend(&scan, "mended.gltf"), expected);
+    assert_eq!(mend(&scan, "elsewhere/mended.gltf"), expected);
+    assert_eq!(mend(&scan, "packed/mended.glb"), expected);
+    let bin = |path: &str| std::fs::read(folder.path().join(path)).expect("a file");
+    assert_eq!(bin("elsewhere/bins/my scarf.bin"), bin("bins/my scarf.bin"));
+    assert!(!folder.path().join("packed/bins").exists());
+    std::fs::remove_file(folder.path().join("bins/my scarf.bin")).expect("removed");
+    let missing = darn().arg("holes").arg(&scan).output().expect("darn runs");
+    let said = String::from_utf8_lossy(&missing.stderr).into_owned();
+    assert!(said.contains("/buffers/0/uri"), "{said}");
+}
+
+#[test]
+fn commands_have_the_limits_of_the_service() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scan = folder.path().join("scarf.glb");
+    std::fs::write(&scan, EXAMPLE).expect("written");
+    for (limit, words) in [
+        (["--max-faces", "10"], "max_faces = 10"),
+        (["--max-vertices", "10"], "max_vertices = 10"),
+        (["--deadline", "1ms"], "deadline has passed"),
+    ] {
+        let out = folder.path().join("mended.glb");
+        let mut command = darn();
+        command.arg("inpaint").arg(&scan).arg("-o").arg(&out);
+        let refused = command.args(limit).output();
+        let refused = refused.expect("darn runs");
+        assert_eq!(refused.status.code(), Some(1), "{limit:?}");
+        let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert!(said.contains(words), "{limit:?}: {said}");
+    }
+}

@@ -1,12 +1,69 @@
-//! Reads and writes whole files. A file is written completely or not at all.
+//! Reads and writes whole files: a file is written completely or not at all. Reads scans with the files beside them.
 
 use super::failure::{Failure, OrFail};
+use crate::settings::SizeArgs;
+use darn_budget::Budget;
+use darn_gltf_scan::{Scan, Siblings, sibling_paths};
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The bytes of a file.
 pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     fs::read(path).or_fail(format!("read {}", path.display()))
+}
+
+/// A scan, and the files beside it that its glTF refers to by relative paths. No file above the glTF's folder is read.
+pub fn read_scan(path: &Path, size: &SizeArgs, budget: &Budget<'_>) -> Result<Scan, Failure> {
+    let reading = || format!("read {}", path.display());
+    let bytes = read(path)?;
+    let files = if is_json(&bytes) {
+        siblings(path, sibling_paths(&bytes).or_fail(reading())?)?
+    } else {
+        Siblings::default()
+    };
+    Scan::read_with_siblings(bytes, files, &size.limits(), budget).or_fail(reading())
+}
+
+fn is_json(bytes: &[u8]) -> bool {
+    let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+    text.trim_ascii_start().starts_with(b"{")
+}
+
+/// Those of the files below a glTF's folder that are there; reading the scan names one that it misses.
+fn siblings(gltf: &Path, paths: Vec<String>) -> Result<Siblings, Failure> {
+    let folder = gltf.parent().unwrap_or(Path::new(""));
+    let mut files = BTreeMap::new();
+    for path in paths {
+        let place = folder.join(&path);
+        if place.is_file() {
+            files.insert(path, read(&place)?.into());
+        }
+    }
+    Ok(Siblings(files))
+}
+
+/// Writes a mended scan: as a GLB with all its files if the output's name ends so, else in the container it was read from.
+///
+/// A glTF written into another folder takes its files there; a file that is there already stays.
+pub fn write_scan(path: &Path, scan: &Scan, mended: &[u8]) -> Result<(), Failure> {
+    let writing = || format!("write {}", path.display());
+    let extension = path.extension().unwrap_or_default();
+    if extension.eq_ignore_ascii_case("glb") {
+        let packed = scan.packed(mended).or_fail(writing())?;
+        return write(path, &packed);
+    }
+    write(path, mended)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    for (name, bytes) in scan.siblings() {
+        let place = folder.join(name);
+        if !place.exists() {
+            let parent = place.parent().unwrap_or(folder);
+            fs::create_dir_all(parent).or_fail(format!("create {}", parent.display()))?;
+            write(&place, bytes)?;
+        }
+    }
+    Ok(())
 }
 
 /// Writes a file beside its target and renames it, so that no reader sees a part of it.

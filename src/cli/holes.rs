@@ -2,15 +2,14 @@
 
 use super::failure::{Failure, OrFail};
 use super::files;
-use darn_budget::Budget;
+use crate::settings::{DeadlineArgs, SizeArgs};
 use darn_contract::port::HolesQuery;
 use darn_contract::v1::{BorderCandidate, HolesReport, Loop, LoopKind, SetAside, Suspect};
-use darn_gltf_scan::{Scan, ScanLimits};
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub struct HolesArgs {
-    /// The scan: GLB, or glTF with data URIs
+    /// The scan: GLB; glTF, with its files beside it; or a zip of those
     scan: PathBuf,
     /// Print the report that POST /holes answers with
     #[arg(long)]
@@ -18,18 +17,20 @@ pub struct HolesArgs {
     /// List what a mesher has probably sealed, too, each with a cut that takes it out
     #[arg(long)]
     suspects: bool,
+    #[command(flatten)]
+    size: SizeArgs,
+    #[command(flatten)]
+    deadline: DeadlineArgs,
 }
 
 /// Runs `darn holes`.
 pub fn run(args: &HolesArgs) -> Result<(), Failure> {
-    let bytes = files::read(&args.scan)?;
-    let name = args.scan.display();
-    let scan = Scan::read(bytes, &ScanLimits::default()).or_fail(format!("read {name}"))?;
+    let budget = args.deadline.budget();
+    let scan = files::read_scan(&args.scan, &args.size, &budget)?;
     let wanted = HolesQuery {
         suspects: args.suspects,
     };
-    let report =
-        darn_mend::find_holes(&scan, wanted, Budget::unlimited()).or_fail("find the holes")?;
+    let report = darn_mend::find_holes(&scan, wanted, &budget).or_fail("find the holes")?;
     if args.json {
         println!(
             "{}",

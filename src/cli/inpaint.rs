@@ -5,18 +5,18 @@ use super::files;
 use super::holes::{kind_name, set_aside};
 use super::network::mender;
 use super::progress::WorkProgress;
-use crate::settings::NetworkArgs;
+use crate::settings::{DeadlineArgs, NetworkArgs, SizeArgs};
 use darn_contract::v1::{HoleReport, Report};
 use darn_contract::{Constraints, FieldError};
-use darn_gltf_scan::{Scan, ScanLimits};
+use darn_mend::Call;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 #[derive(Debug, clap::Args)]
 pub struct InpaintArgs {
-    /// The scan: GLB, or glTF with data URIs
+    /// The scan: GLB; glTF, with its files beside it; or a zip of those
     scan: PathBuf,
-    /// Where the mended scan goes, in the container the scan came in
+    /// Where the mended scan goes, in the container the scan came in; a name that ends in .glb makes one file of a glTF and its files
     #[arg(short, long)]
     output: PathBuf,
     /// What the new cloth is to keep to, as JSON
@@ -25,6 +25,10 @@ pub struct InpaintArgs {
     /// Where the report goes, as JSON
     #[arg(long)]
     report: Option<PathBuf>,
+    #[command(flatten)]
+    size: SizeArgs,
+    #[command(flatten)]
+    deadline: DeadlineArgs,
     #[command(flatten)]
     network: NetworkArgs,
 }
@@ -38,18 +42,21 @@ pub fn run(args: &InpaintArgs) -> Result<(), Failure> {
         Some(path) => constraints(path)?,
         None => Constraints::default(),
     };
-    let bytes = files::read(&args.scan)?;
+    let budget = args.deadline.budget();
     let started = Instant::now();
-    let scan = Scan::read(bytes, &ScanLimits::default()).or_fail(format!("read {name}"))?;
+    let scan = files::read_scan(&args.scan, &args.size, &budget)?;
     let read = started.elapsed();
     progress.stage("loading weights");
     let mender = mender(&args.network)?;
     progress.stage("mending");
-    let mut mended =
-        darn_mend::mend(&scan, &constraints, &mender).or_fail(format!("mend {name}"))?;
+    let call = Call {
+        mender: &mender,
+        budget: &budget,
+    };
+    let mut mended = darn_mend::mend(&scan, &constraints, call).or_fail(format!("mend {name}"))?;
     darn_mend::add_read_time(&mut mended.report.timings, read);
     progress.stage("writing");
-    files::write(&args.output, &mended.bytes)?;
+    files::write_scan(&args.output, &scan, &mended.bytes)?;
     if let Some(path) = &args.report {
         let mut json = serde_json::to_vec_pretty(&mended.report).or_fail("write the report")?;
         json.push(b'\n');

@@ -4,14 +4,14 @@ use super::failure::{Failure, OrFail};
 use super::files;
 use super::network::mender;
 use super::progress::WorkProgress;
-use crate::settings::NetworkArgs;
+use crate::settings::{DeadlineArgs, NetworkArgs, SizeArgs};
 use darn_contract::Search;
-use darn_gltf_scan::{Scan, ScanLimits};
+use darn_mend::Call;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub struct OptimizeAnchorArgs {
-    /// The scan: GLB, or glTF with data URIs
+    /// The scan: GLB; glTF, with its files beside it; or a zip of those
     scan: PathBuf,
     /// The point that the cloth should reach, in scene space
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true)]
@@ -32,6 +32,10 @@ pub struct OptimizeAnchorArgs {
     #[arg(long, value_name = "FILE")]
     mend: Option<PathBuf>,
     #[command(flatten)]
+    size: SizeArgs,
+    #[command(flatten)]
+    deadline: DeadlineArgs,
+    #[command(flatten)]
     network: NetworkArgs,
 }
 
@@ -40,8 +44,8 @@ pub fn run(args: &OptimizeAnchorArgs) -> Result<(), Failure> {
     let name = args.scan.display();
     let progress = WorkProgress::staged("darn");
     progress.stage("reading");
-    let bytes = files::read(&args.scan)?;
-    let scan = Scan::read(bytes, &ScanLimits::default()).or_fail(format!("read {name}"))?;
+    let budget = args.deadline.budget();
+    let scan = files::read_scan(&args.scan, &args.size, &budget)?;
     progress.stage("loading weights");
     let mender = mender(&args.network)?;
     progress.stage("searching");
@@ -52,8 +56,12 @@ pub fn run(args: &OptimizeAnchorArgs) -> Result<(), Failure> {
         exhaustive: args.exhaustive,
         map: args.map.is_some(),
     };
+    let call = || Call {
+        mender: &mender,
+        budget: &budget,
+    };
     let mut found =
-        darn_mend::optimize_anchor(&scan, &search, &mender).or_fail(format!("search {name}"))?;
+        darn_mend::optimize_anchor(&scan, &search, call()).or_fail(format!("search {name}"))?;
     if let Some(path) = &args.map {
         // The picture is in its file; the JSON would repeat it as base64.
         files::write(path, &std::mem::take(&mut found.map_png))?;
@@ -61,8 +69,8 @@ pub fn run(args: &OptimizeAnchorArgs) -> Result<(), Failure> {
     if let Some(path) = &args.mend {
         progress.stage("mending");
         let anchor = darn_mend::anchor_of(&found, &search);
-        let mended = darn_mend::mend(&scan, &anchor, &mender).or_fail(format!("mend {name}"))?;
-        files::write(path, &mended.bytes)?;
+        let mended = darn_mend::mend(&scan, &anchor, call()).or_fail(format!("mend {name}"))?;
+        files::write_scan(path, &scan, &mended.bytes)?;
     }
     drop(progress);
     let json = serde_json::to_string_pretty(&found).or_fail("write the answer")?;

@@ -2,8 +2,10 @@
 
 use super::failure::{Failure, OrFail};
 use super::files;
+use crate::settings::SizeArgs;
+use darn_budget::Budget;
 use darn_geometry::mesh::{Vec3, weld};
-use darn_gltf_scan::{Scan, ScanLimits};
+use darn_gltf_scan::Scan;
 use darn_render::{
     CLOTH, CameraDirection, EdgeLines, Framing, MAX_SIDE, MENDED, PictureOptions, picture,
 };
@@ -13,7 +15,7 @@ use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub struct RenderArgs {
-    /// The scan: GLB, or glTF with data URIs
+    /// The scan: GLB; glTF, with its files beside it; or a zip of those
     scan: PathBuf,
     /// Where the picture goes, as PNG
     #[arg(short, long)]
@@ -30,13 +32,13 @@ pub struct RenderArgs {
     /// Draw every edge, not only boundaries
     #[arg(long)]
     wireframe: bool,
+    #[command(flatten)]
+    limits: SizeArgs,
 }
 
 /// Runs `darn render`.
 pub fn run(args: &RenderArgs) -> Result<(), Failure> {
-    let bytes = files::read(&args.scan)?;
-    let scan = Scan::read(bytes, &ScanLimits::default())
-        .or_fail(format!("read {}", args.scan.display()))?;
+    let scan = files::read_scan(&args.scan, &args.limits, Budget::unlimited())?;
     let welded = weld::weld(&scan.surface);
     let tints: Vec<[u8; 3]> = welded
         .soup_face

@@ -27,7 +27,7 @@ pub fn run(settings: &ServeCommand) -> Result<(), Failure> {
         .build_global())
     .or_fail("start the threads of mends (DARN_THREADS)")?;
     let mender = Arc::new(NetworkMender {
-        scan_limits: settings.scan_limits(),
+        scan_limits: settings.size.limits(),
         ..network::mender(&settings.network)?
     });
     let idle = Arc::clone(&mender);

@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Exhausted {
     /// The caller has left, or the deadline has passed or would pass before the next step ends.
-    #[error("nobody waits for the answer any more")]
+    #[error("the deadline has passed, or nobody waits for the answer any more")]
     Cancelled,
     /// The request needs more work than its size allows.
     #[error(
