@@ -88,6 +88,7 @@ impl GrpcService {
             scan,
             parameters,
             upload,
+            ..
         } = self.receive::<HolesQuery>(request).await?;
         let wanted = parameters.unwrap_or_default();
         self.0
