@@ -17,9 +17,9 @@ const NARROW: f64 = 1e-3;
 /// The tolerance's bound as a share of the shortest border edge, however coarse the coordinates are.
 const WIDEST: f64 = 0.1;
 /// Vertices near one vertex that are looked at.
-const MAX_NEAR: usize = 16;
-/// Vertices that one vertex may stand for.
-const MAX_CLUSTER: usize = 16;
+const MAX_NEAR: usize = 64;
+/// Vertices that one vertex may stand for: as many as may meet at the pole of a ball.
+const MAX_CLUSTER: usize = 512;
 /// Cosine between two faces at an edge above which one lies on the other: then they are two skins, and no seam.
 pub(super) const FOLDED: f64 = 0.95;
 /// Nanoseconds of work a border vertex in the search tree, and in a search.
@@ -153,15 +153,18 @@ impl<'a> Border<'a> {
         let beside = self.sharing_faces(&pairs);
         let mut groups: Vec<Vec<u32>> = (0..self.vertices.len() as u32).map(|k| vec![k]).collect();
         let mut lowest: Vec<u32> = (0..self.vertices.len() as u32).collect();
+        let mut steps = Steps::of(self.budget);
         for pair in &pairs {
             let (a, b) = (lowest[pair.low as usize], lowest[pair.high as usize]);
             let (low, high) = (a.min(b), a.max(b));
             let (one, other) = (&groups[low as usize], &groups[high as usize]);
+            steps.take(FOUND_WORK * (1 + one.len() * other.len()) as u64)?;
             let share = |x: u32, y: u32| beside.binary_search(&(x.min(y), x.max(y))).is_ok();
-            let apart = one.len() + other.len() > MAX_CLUSTER
+            let apart = low == high
+                || one.len() + other.len() > MAX_CLUSTER
                 || self.distance(low, high) > self.tolerance(low, high)
                 || one.iter().any(|x| other.iter().any(|y| share(*x, *y)));
-            if low == high || apart {
+            if apart {
                 continue;
             }
             let moved = std::mem::take(&mut groups[high as usize]);

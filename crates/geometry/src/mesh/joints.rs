@@ -13,6 +13,8 @@ const MAX_FACES: usize = 16;
 /// Cosine between two faces up to which one continues the other at an edge that more than two share: no sharper than a
 /// fold of 60 degrees.
 const CONTINUES: f64 = 0.5;
+/// The same for a face that hangs on the edge alone: it must lie all but flat to be more of the sheet, and no fin.
+const FLAT: f64 = -0.9;
 /// What running the same way along an edge counts against a pair, as a cosine.
 const SAME_WAY: f64 = 0.02;
 /// Nanoseconds of work a pair of faces at an edge.
@@ -25,7 +27,7 @@ pub(super) struct Joints {
     pub twins: Twins,
     /// The pairs that run the same way: one of their faces is to be turned.
     pub same_way: Vec<[HalfEdgeId; 2]>,
-    /// All half-edges of each edge at which not every one has a partner.
+    /// All half-edges of each edge that more than two share, or two that are no pair.
     pub crowded: Vec<Vec<HalfEdgeId>>,
 }
 
@@ -71,7 +73,8 @@ pub(super) fn joints(
         let free = |h: HalfEdgeId| found.twins.of(h).is_none() && shared.binary_search(&h).is_err();
         let hangs = |h: &HalfEdgeId| free(h.next()) && free(h.previous());
         let pairs = chosen(placed, &group, hangs, &is_exact);
-        if 2 * pairs.len() < group.len() {
+        let is_crowded = group.len() > 2 || pairs.is_empty();
+        if is_crowded {
             found.crowded.push(group);
         }
         for [g, h] in pairs {
@@ -106,6 +109,7 @@ fn chosen(
             let cosine = wings[i].dot(&wings[j]);
             let same_way = placed.from(group[i]) == placed.from(group[j]);
             let most = match (group.len() > 2, same_way, is_exact(group[i], group[j])) {
+                (true, ..) if hanging[i] != hanging[j] => FLAT,
                 (true, ..) => CONTINUES,
                 (_, true, _) => 0.0,
                 (_, _, false) => FOLDED,

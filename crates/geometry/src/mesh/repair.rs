@@ -1,8 +1,8 @@
 //! The faces of a soup on their way to a welded mesh, and what is done to those that do not fit together as they are.
 //!
-//! In order: slivers at the border are left out, border vertices that nearly meet become one place, border edges are split where vertices of others lie on
-//! them, the half-edges are paired ([`joints`](super::joints)), faces are turned so that neighbours face one way, and
-//! fins are left out.
+//! In order: slivers at the border are left out, border vertices that nearly meet become one place, border edges are
+//! split where vertices of others lie on them, the half-edges are paired ([`joints`](super::joints)), faces are turned
+//! so that neighbours face one way, and fins are left out.
 
 use std::cmp::Reverse;
 
@@ -23,19 +23,29 @@ const FACE_WORK: u64 = 150;
 
 /// Faces that lead back to those of a soup.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Working {
-    /// Per face its corners, vertices of the soup.
-    pub corners: Vec<[u32; 3]>,
+pub(super) struct Sources {
     /// Per face the soup's face, ascending; the parts of a split face have the same.
     pub soup_face: Vec<u32>,
     /// Per face whether a face left out shows its other side.
     pub two_sided: Vec<bool>,
 }
 
+/// Faces with corners of their own.
+#[derive(Debug, Clone, Default)]
+struct Working {
+    /// Per face its corners, vertices of the soup.
+    corners: Vec<[u32; 3]>,
+    sources: Sources,
+}
+
 /// The mesh of a soup before its vertices are numbered.
 pub(super) struct Repaired {
     /// The faces.
-    pub faces: Working,
+    pub sources: Sources,
+    /// Per face a vertex of the soup in the exact place of each corner.
+    pub places: Vec<[u32; 3]>,
+    /// The faces that were turned or split, ascending, with the soup's vertices at their corners.
+    pub changed: Vec<(FaceId, [u32; 3])>,
     /// Their twins.
     pub twins: Twins,
     /// What [`Topology::non_manifold`](super::topology::Topology::non_manifold) lists.
@@ -61,18 +71,17 @@ impl Repair<'_> {
     ///
     /// # Errors
     /// `Exhausted`.
-    pub fn joined(&self, mut faces: Working) -> Result<Repaired, Exhausted> {
+    pub fn joined(&self, mut sources: Sources) -> Result<Repaired, Exhausted> {
         let mut set_aside = SetAside::default();
-        let mut places = placed(&faces.corners, self.exact);
+        let mut places = self.places_of(&sources);
         let mut pairing = pair_half_edges(&places, self.exact);
         let slivers = self.border_slivers(&places, &pairing.twins);
         if !slivers.is_empty() {
             self.budget.spend_at_once(FACE_WORK * places.len() as u64)?;
-            let mut kept = vec![true; places.len()];
-            slivers.iter().for_each(|f| kept[f.index()] = false);
             set_aside.degenerate_faces = slivers.len();
-            faces = faces.only(&kept);
-            places = placed(&faces.corners, self.exact);
+            let is_sliver = |f: usize| slivers.binary_search(&FaceId(f as u32)).is_ok();
+            sources = sources.only(|f| !is_sliver(f));
+            places = self.places_of(&sources);
             pairing = pair_half_edges(&places, self.exact);
         }
         let border = self.border(&places, &pairing.twins)?;
@@ -84,7 +93,9 @@ impl Repair<'_> {
         drop(border);
         if near.is_empty() && junctions.is_empty() && pairing.non_manifold.is_empty() {
             return Ok(Repaired {
-                faces,
+                sources,
+                places,
+                changed: Vec::new(),
                 twins: pairing.twins,
                 non_manifold: Vec::new(),
                 set_aside,
@@ -92,6 +103,11 @@ impl Repair<'_> {
         }
         drop(pairing);
         self.budget.spend_at_once(FACE_WORK * places.len() as u64)?;
+        let soup_faces = sources.soup_face.iter();
+        let mut faces = Working {
+            corners: soup_faces.map(|&f| self.soup.faces[f as usize]).collect(),
+            sources,
+        };
         let mut place = self.exact.to_vec();
         if !near.is_empty() {
             set_aside.near_seam_vertices = near.len();
@@ -109,6 +125,15 @@ impl Repair<'_> {
             places = placed(&faces.corners, &place);
         }
         self.chosen(faces, &places, set_aside)
+    }
+
+    /// The soup's faces by exact places.
+    fn places_of(&self, sources: &Sources) -> Vec<[u32; 3]> {
+        let soup_faces = sources.soup_face.iter();
+        let place = |v: u32| self.exact[v as usize];
+        soup_faces
+            .map(|&f| self.soup.faces[f as usize].map(place))
+            .collect()
     }
 
     /// The faces at the border that are no higher than the tolerance, ascending: they keep borders apart that meet.
@@ -182,11 +207,27 @@ impl Repair<'_> {
         for (corners, turned) in faces.corners.iter_mut().zip(&turning.turned) {
             if *turned {
                 corners.swap(1, 2);
-                set_aside.flipped_faces += 1;
             }
         }
         crowded.iter_mut().flatten().for_each(|h| *h = turned(*h));
-        Ok(without_fins(faces, twins, &crowded, set_aside))
+        let is_fin = fins(&twins, &crowded);
+        let flipped = turning.turned.iter().zip(&is_fin);
+        set_aside.flipped_faces = flipped.filter(|(turned, fin)| **turned && !**fin).count();
+        set_aside.fins = is_fin.iter().filter(|fin| **fin).count();
+        let (twins, non_manifold) = without(&is_fin, &twins, &crowded);
+        let faces = faces.only(|f| !is_fin[f]);
+        let unlike = |(f, corners): (u32, &[u32; 3])| {
+            let own = self.soup.faces[faces.sources.soup_face[f as usize] as usize];
+            (own != *corners).then_some((FaceId(f), *corners))
+        };
+        Ok(Repaired {
+            places: placed(&faces.corners, self.exact),
+            changed: (0u32..).zip(&faces.corners).filter_map(unlike).collect(),
+            sources: faces.sources,
+            twins,
+            non_manifold,
+            set_aside,
+        })
     }
 }
 
@@ -196,71 +237,71 @@ fn placed(corners: &[[u32; 3]], place: &[u32]) -> Vec<[u32; 3]> {
     corners.iter().map(face).collect()
 }
 
-/// Leaves out the fins: connected pieces of few faces that hang on an edge which others share.
-fn without_fins(
-    faces: Working,
-    twins: Twins,
-    crowded: &[Vec<HalfEdgeId>],
-    mut set_aside: SetAside,
-) -> Repaired {
-    let (component, count) = face_components(&twins);
+/// Per face whether it belongs to a fin: a connected piece of few faces at an edge that larger pieces share.
+fn fins(twins: &Twins, crowded: &[Vec<HalfEdgeId>]) -> Vec<bool> {
+    let (component, count) = face_components(twins);
     let mut size = vec![0usize; count];
     component.iter().for_each(|&c| size[c as usize] += 1);
     let most = MAX_FIN.min(component.len() / 4);
     let mut fin = vec![false; count];
     for group in crowded.iter().filter(|group| group.len() > 2) {
-        let hanging = group.iter().filter(|h| twins.of(**h).is_none());
+        let pieces = || group.iter().map(|h| component[h.face().index()]);
         // Where everything at an edge is small, its largest piece is the cloth.
-        let of = |h: &HalfEdgeId| component[h.face().index()];
-        let largest = group
-            .iter()
-            .map(of)
-            .max_by_key(|&c| (size[c as usize], Reverse(c)));
-        for c in hanging.map(of).filter(|&c| Some(c) != largest) {
+        let largest = pieces().max_by_key(|&c| (size[c as usize], Reverse(c)));
+        for c in pieces().filter(|&c| Some(c) != largest) {
             fin[c as usize] |= size[c as usize] <= most;
         }
     }
-    let kept: Vec<bool> = component.iter().map(|&c| !fin[c as usize]).collect();
-    set_aside.fins = kept.iter().filter(|kept| !**kept).count();
-    let mut number = vec![0; kept.len()];
-    let kept_numbers = number.iter_mut().zip(&kept).filter(|(_, kept)| **kept);
-    for (next, (number, _)) in (0..).zip(kept_numbers) {
-        *number = next;
-    }
+    component.iter().map(|&c| fin[c as usize]).collect()
+}
+
+/// The twins of the faces that are no fins, which come off whole, and what
+/// [`Topology::non_manifold`](super::topology::Topology::non_manifold) lists of them.
+fn without(
+    is_fin: &[bool],
+    twins: &Twins,
+    crowded: &[Vec<HalfEdgeId>],
+) -> (Twins, Vec<HalfEdgeId>) {
+    let mut number = vec![0; is_fin.len()];
+    let kept = number.iter_mut().zip(is_fin).filter(|(_, fin)| !**fin);
+    (0u32..).zip(kept).for_each(|(k, (number, _))| *number = k);
     let renumbered = |h: HalfEdgeId| FaceId(number[h.face().index()]).half_edges()[h.corner()];
-    let is_kept = |h: &HalfEdgeId| kept[h.face().index()];
-    let half_edges = (0..twins.len() as u32).map(HalfEdgeId);
-    let mut non_manifold: Vec<HalfEdgeId> = crowded
-        .iter()
-        .filter(|group| group.iter().filter(|h| is_kept(h)).count() > 1)
-        .flatten()
-        .filter(|h| is_kept(h) && twins.of(**h).is_none())
-        .map(|&h| renumbered(h))
-        .collect();
+    let is_kept = |h: &HalfEdgeId| !is_fin[h.face().index()];
+    let is_shared = |group: &&Vec<HalfEdgeId>| group.iter().filter(|h| is_kept(h)).count() > 1;
+    let shared = crowded.iter().filter(is_shared).flatten();
+    let unjoined = shared.filter(|h| is_kept(h) && twins.of(**h).is_none());
+    let mut non_manifold: Vec<HalfEdgeId> = unjoined.map(|&h| renumbered(h)).collect();
     non_manifold.sort_unstable();
     non_manifold.dedup();
-    let of_kept = half_edges.filter(is_kept);
-    Repaired {
-        twins: of_kept.map(|h| twins.of(h).map(renumbered)).collect(),
-        faces: faces.only(&kept),
-        non_manifold,
-        set_aside,
+    let half_edges = (0..twins.len() as u32).map(HalfEdgeId).filter(is_kept);
+    let twins = half_edges.map(|h| twins.of(h).map(renumbered)).collect();
+    (twins, non_manifold)
+}
+
+impl Sources {
+    /// The faces whose indices pass a test.
+    fn only(self, test: impl Fn(usize) -> bool) -> Sources {
+        Sources {
+            soup_face: filtered(self.soup_face, &test),
+            two_sided: filtered(self.two_sided, &test),
+        }
     }
 }
 
+/// The values whose indices pass a test.
+fn filtered<T>(values: Vec<T>, test: impl Fn(usize) -> bool) -> Vec<T> {
+    let each = values.into_iter().enumerate();
+    each.filter(|(f, _)| test(*f))
+        .map(|(_, value)| value)
+        .collect()
+}
+
 impl Working {
-    /// The faces that are kept.
-    fn only(self, kept: &[bool]) -> Working {
-        fn filtered<T>(values: Vec<T>, kept: &[bool]) -> Vec<T> {
-            let each = values.into_iter().zip(kept);
-            each.filter(|(_, kept)| **kept)
-                .map(|(value, _)| value)
-                .collect()
-        }
+    /// The faces whose indices pass a test.
+    fn only(self, test: impl Fn(usize) -> bool) -> Working {
         Working {
-            corners: filtered(self.corners, kept),
-            soup_face: filtered(self.soup_face, kept),
-            two_sided: filtered(self.two_sided, kept),
+            corners: filtered(self.corners, &test),
+            sources: self.sources.only(test),
         }
     }
 
@@ -278,10 +319,15 @@ impl Working {
                 }
                 None => vec![corners],
             };
-            out.soup_face
-                .extend(parts.iter().map(|_| self.soup_face[f as usize]));
-            out.two_sided
-                .extend(parts.iter().map(|_| self.two_sided[f as usize]));
+            let (own, out_sources) = (&self.sources, &mut out.sources);
+            let soup_face = own.soup_face[f as usize];
+            let two_sided = own.two_sided[f as usize];
+            out_sources
+                .soup_face
+                .extend(parts.iter().map(|_| soup_face));
+            out_sources
+                .two_sided
+                .extend(parts.iter().map(|_| two_sided));
             out.corners.extend(parts);
         }
         out

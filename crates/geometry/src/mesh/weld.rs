@@ -5,7 +5,7 @@ use darn_budget::{Budget, Exhausted};
 use super::TriMesh;
 use super::index::{FaceId, HalfEdgeId};
 use super::pairing::{Twins, bucket_starts, places};
-use super::repair::{Repair, Repaired, Working};
+use super::repair::{Repair, Repaired, Sources};
 use super::topology::Topology;
 
 /// A triangle soup made into surfaces, and how its faces lead back to the soup's.
@@ -36,7 +36,7 @@ pub struct SetAside {
     pub degenerate_faces: usize,
     /// Faces left out because an earlier face has the same three places (whichever side it shows).
     pub duplicate_faces: usize,
-    /// Faces left out because they hang, in pieces of few, on an edge that others share more smoothly.
+    /// Faces left out because they hang, in pieces of few, on an edge of a larger piece.
     pub fins: usize,
     /// Faces turned to face the same way as those around them.
     pub flipped_faces: usize,
@@ -103,43 +103,39 @@ pub fn weld_within(
         precision,
         budget,
     };
-    let corners = distinct.faces.iter();
-    let repaired = repair.joined(Working {
-        corners: corners.map(|&f| soup.faces[f as usize]).collect(),
+    let repaired = repair.joined(Sources {
         soup_face: distinct.faces,
         two_sided: distinct.two_sided,
     })?;
     let Repaired {
-        faces,
+        sources,
+        places,
+        changed,
         twins,
         non_manifold,
         set_aside,
     } = repaired;
     let (fan, fans) = twins.corner_fans();
     let mut positions = Vec::with_capacity(fans);
-    for (corner, &vertex) in faces.corners.as_flattened().iter().enumerate() {
+    for (corner, &place) in places.as_flattened().iter().enumerate() {
         if fan[corner] as usize == positions.len() {
-            positions.push(soup.positions[exact[vertex as usize] as usize]);
+            positions.push(soup.positions[place as usize]);
         }
     }
-    let unlike = |(f, corners): (u32, &[u32; 3])| {
-        let own = soup.faces[faces.soup_face[f as usize] as usize];
-        (own != *corners).then_some((FaceId(f), *corners))
-    };
     let (numbered, _) = fan.as_chunks::<3>();
     Ok(WeldedMesh {
         mesh: TriMesh {
             positions,
             faces: numbered.to_vec(),
         },
-        changed: (0u32..).zip(&faces.corners).filter_map(unlike).collect(),
-        soup_face: faces.soup_face,
+        changed,
+        soup_face: sources.soup_face,
         set_aside: SetAside {
             degenerate_faces: distinct.set_aside.degenerate_faces + set_aside.degenerate_faces,
             duplicate_faces: distinct.set_aside.duplicate_faces,
             ..set_aside
         },
-        two_sided: faces.two_sided,
+        two_sided: sources.two_sided,
         twins,
         non_manifold,
     })

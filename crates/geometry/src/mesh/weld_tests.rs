@@ -164,6 +164,29 @@ fn a_moebius_strip_stays_cut_where_its_sides_meet() {
 }
 
 #[test]
+fn a_fin_of_two_triangles_comes_off_a_rim_whichever_way_they_face() {
+    let sound = cloth(20);
+    let (_, expected) = loops_of(&weld(&sound));
+    let rim = &expected[2];
+    let mesh = weld(&sound).mesh;
+    let [a, b] = [0, 1].map(|k: usize| mesh.positions[rim.vertices[k].index()]);
+    for faces in [[[0, 1, 2], [1, 0, 3]], [[0, 1, 2], [0, 1, 3]]] {
+        let (across, up) = ((a + b) * 0.5 + (rim.centroid - a) * 0.2, Vec3::z() * 0.03);
+        let fin = TriMesh {
+            positions: vec![a, b, across + up, across - up],
+            faces: faces.to_vec(),
+        };
+        let welded = weld(&concat(&sound, &fin));
+        let (topology, loops) = loops_of(&welded);
+        assert_eq!(
+            (welded.set_aside.fins, welded.set_aside.flipped_faces),
+            (2, 0)
+        );
+        assert_eq!((topology.non_manifold, loops.len()), (vec![], 3));
+    }
+}
+
+#[test]
 fn two_skins_that_nearly_touch_stay_apart() {
     let front = cloth(20);
     let back = TriMesh {
