@@ -20,6 +20,7 @@ RUN scripts/stub-sources && cargo build --release --locked --bin darn && cargo c
 COPY proto proto
 COPY weights weights
 COPY examples examples
+COPY web/dist web/dist
 COPY crates crates
 COPY src src
 RUN cargo build --release --locked --bin darn

@@ -5,7 +5,7 @@ SHELL := bash
 CARGO ?= cargo
 export DARN_LISTEN ?= 127.0.0.1:8080
 
-.PHONY: help setup build run test lint fmt docs clean
+.PHONY: help setup build web run test lint fmt docs clean
 
 help: ## Show this list
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{ printf "make %-6s %s\n", $$1, $$2 }'
@@ -15,6 +15,9 @@ setup: ## Install what is missing: Debian packages, the glTF validator
 
 build: ## Build target/release/darn
 	$(CARGO) build --release --locked
+
+web: ## Build the editor's page, web/dist, after a change in web/
+	@scripts/web
 
 run: ## Set up, build, serve on DARN_LISTEN, mend the example through HTTP, go on serving
 	@scripts/setup run
@@ -40,4 +43,4 @@ docs: ## Build the crates' documentation, warnings are errors
 
 clean: ## Remove what was built
 	$(CARGO) clean
-	rm -rf tests/validator/node_modules
+	rm -rf tests/validator/node_modules web/node_modules

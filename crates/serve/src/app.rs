@@ -49,6 +49,8 @@ pub struct App {
     pub limits: RequestLimits,
     /// Origins of web pages that may call; `*` for any.
     pub allow_origin: Vec<String>,
+    /// Whether the editor is served.
+    pub editor: bool,
     /// The open connections.
     pub connections: Arc<ConnectionTable>,
     /// Scans kept for editing.
@@ -177,6 +179,7 @@ impl App {
             limits,
             connections,
             allow_origin: settings.allow_origin.clone(),
+            editor: !settings.no_editor,
             sessions,
             pool,
             sharing,

@@ -112,6 +112,10 @@ pub struct ServeArgs {
     )]
     pub allow_origin: Vec<String>,
 
+    /// Leave out the editor, the web page at `/`
+    #[arg(long, env = "DARN_NO_EDITOR")]
+    pub no_editor: bool,
+
     /// Which log lines are written, such as info or darn=debug
     #[arg(long, env = "DARN_LOG", value_name = "FILTER", default_value = "info")]
     pub log: String,

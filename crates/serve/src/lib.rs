@@ -15,6 +15,7 @@ mod connection_table;
 mod connections;
 mod content_coding;
 mod counted;
+mod editor;
 mod ended_sessions;
 mod error;
 mod fair_queue;
@@ -39,6 +40,7 @@ mod response;
 mod routes;
 mod scan_files;
 mod schema;
+mod service_info;
 mod session_routes;
 mod session_store;
 mod shutdown;
@@ -233,11 +235,19 @@ pub async fn serve(
 
 /// The routes of HTTP and gRPC together, as one listener serves them.
 pub fn router(app: &Arc<App>) -> Router {
-    routes::finish(routes::routes().merge(grpc_routes(app)), app)
+    routes::finish(http_routes(app).merge(grpc_routes(app)), app)
 }
 
 fn http_router(app: &Arc<App>) -> Router {
-    routes::finish(routes::routes(), app)
+    routes::finish(http_routes(app), app)
+}
+
+fn http_routes(app: &Arc<App>) -> Router<Arc<App>> {
+    if app.editor {
+        routes::routes().merge(editor::routes())
+    } else {
+        routes::routes()
+    }
 }
 
 fn grpc_router(app: &Arc<App>) -> Router {

@@ -27,6 +27,7 @@ pub(super) fn text() -> Bytes {
 pub fn document() -> Value {
     let mut schemas = schema::schemas();
     schemas.insert("Problem".to_owned(), problem_schema());
+    schemas.insert("Info".to_owned(), info_schema());
     json!({
         "openapi": "3.1.0",
         "info": {
@@ -49,6 +50,11 @@ pub fn document() -> Value {
             "/livez": { "get": probe("Whether the process runs", &[]) },
             "/readyz": { "get": probe("Whether the service mends: warmed up and not shutting down", &[503]) },
             "/metrics": { "get": probe("Metrics in Prometheus text format", &[]) },
+            "/info": { "get": {
+                "summary": "The version, and the limits of a request",
+                "operationId": "info",
+                "responses": { "200": { "description": "Version and limits", "content": { JSON: { "schema": reference("Info") } } } },
+            } },
             "/openapi.json": { "get": {
                 "summary": "This document",
                 "responses": { "200": { "description": "The document", "content": { JSON: {} } } },
@@ -259,5 +265,25 @@ fn problem_schema() -> Value {
             },
         },
         "required": ["type", "title", "status", "code", "detail", "request_id"],
+    })
+}
+
+fn info_schema() -> Value {
+    json!({
+        "type": "object",
+        "description": "The version, and the limits that a client can check before it sends a scan",
+        "properties": {
+            "version": { "type": "string", "description": "darn's version" },
+            "limits": {
+                "type": "object",
+                "properties": {
+                    "bodyBytes": { "type": "integer", "description": "Most bytes of a request's body" },
+                    "deadlineSeconds": { "type": "number", "description": "Longest time that a scan may wait and be mended" },
+                    "sessionIdleSeconds": { "type": "number", "description": "A session ends after so long without a request" },
+                },
+                "required": ["bodyBytes", "deadlineSeconds", "sessionIdleSeconds"],
+            },
+        },
+        "required": ["version", "limits"],
     })
 }

@@ -27,7 +27,7 @@ use super::{
     openapi, parameters,
     response::{self, ANCHOR_DISTANCE, HOLES_FILLED, LOOPS_SKIPPED, MendResponse, RESULT},
     scan_files::AnswerForm,
-    session_routes,
+    service_info, session_routes,
     telemetry::{REQUEST_ID, RequestId},
 };
 use darn_contract::{Constraints, Search, excerpt};
@@ -42,6 +42,7 @@ pub fn routes() -> Router<Arc<App>> {
         .route("/livez", get(|| async { "alive\n" }))
         .route("/readyz", get(readyz))
         .route("/metrics", get(metrics))
+        .route("/info", get(service_info::answer))
         .route("/openapi.json", get(openapi_document))
         .fallback(|| async { RequestError::NotFound })
         .method_not_allowed_fallback(|| async { RequestError::MethodNotAllowed })

@@ -1,0 +1,39 @@
+//! `GET /info`: the version, and the limits that a client can check before it sends a scan.
+
+use std::sync::Arc;
+
+use axum::{extract::State, response::Response};
+use serde::Serialize;
+
+use super::{app::App, response};
+
+#[derive(Debug, Serialize)]
+#[serde(rename_all = "camelCase")]
+struct Info {
+    /// darn's version.
+    version: &'static str,
+    limits: InfoLimits,
+}
+
+#[derive(Debug, Serialize)]
+#[serde(rename_all = "camelCase")]
+struct InfoLimits {
+    /// Most bytes of a request's body.
+    body_bytes: usize,
+    /// Longest time that a scan may wait and be mended, in seconds.
+    deadline_seconds: f64,
+    /// A session ends after so many seconds without a request.
+    session_idle_seconds: f64,
+}
+
+/// Answers `GET /info`.
+pub async fn answer(State(app): State<Arc<App>>) -> Response {
+    response::json_response(response::json(&Info {
+        version: env!("CARGO_PKG_VERSION"),
+        limits: InfoLimits {
+            body_bytes: app.limits.body,
+            deadline_seconds: app.limits.deadline.as_secs_f64(),
+            session_idle_seconds: app.sessions.limits().idle.as_secs_f64(),
+        },
+    }))
+}

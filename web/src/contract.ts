@@ -1,0 +1,27 @@
+/**
+ * The service's messages, by the names of `proto/darn/v1/darn.proto`. The generated file is written by `npm run contract`
+ * from `proto/openapi.json`. Every field may be absent, as in proto3's JSON.
+ */
+import type { components } from './contract.generated.js';
+
+type Schemas = components['schemas'];
+
+export type Anchor = Schemas['Anchor'];
+export type AnchorFound = Schemas['AnchorFound'];
+export type AnchorQuery = Schemas['AnchorQuery'];
+export type Constraints = Schemas['Constraints'];
+export type Edit = Schemas['Edit'];
+export type HoleReport = Schemas['HoleReport'];
+export type HolesReport = Schemas['HolesReport'];
+export type Info = Schemas['Info'];
+export type Loop = Schemas['Loop'];
+export type Problem = Schemas['Problem'];
+export type Report = Schemas['Report'];
+export type Session = Schemas['Session'];
+export type SessionHole = Schemas['SessionHole'];
+export type Skipped = Schemas['Skipped'];
+
+/** A point or a direction in the scene's space. */
+export type Vec3 = [number, number, number];
+/** A point of a chart's unit square. */
+export type Uv = [number, number];

@@ -1,0 +1,54 @@
+/** Boundary loops as the editor lists them. */
+import type { Loop } from '../contract.js';
+
+/** A kind of loop, and how it is named and drawn. The colours are told apart in grey, too, and each kind has its own line. */
+export interface KindStyle {
+  /** Heading of its group in the panel. */
+  readonly plural: string;
+  readonly singular: string;
+  readonly color: string;
+  readonly line: 'solid' | 'dashed' | 'dotted';
+}
+
+const STYLES: ReadonlyMap<string, KindStyle> = new Map([
+  ['HOLE', { plural: 'Holes', singular: 'Hole', color: '#d9480f', line: 'solid' }],
+  ['TUBE_END', { plural: 'Ends of sleeves', singular: 'End of a sleeve', color: '#2b8a3e', line: 'dotted' }],
+  ['OUTER_BOUNDARY', { plural: 'Borders', singular: 'Border', color: '#1864ab', line: 'dashed' }],
+]);
+
+/** Also for kinds that a newer service may name. */
+export function styleOf(kind: string): KindStyle {
+  const words = kind.toLowerCase().replaceAll('_', ' ');
+  const name = words.charAt(0).toUpperCase() + words.slice(1);
+  return STYLES.get(kind) ?? { plural: name, singular: name, color: '#862e9c', line: 'dotted' };
+}
+
+/** Whether the service fills loops of this kind. */
+export function isHole(loop: Loop): boolean {
+  return loop.kind === 'HOLE';
+}
+
+/** Kinds in the order of the panel, each with its loops, longest first. */
+export function byKind(loops: readonly Loop[]): [string, Loop[]][] {
+  const order = [...STYLES.keys()];
+  const groups = new Map<string, Loop[]>(order.map((kind) => [kind, []]));
+  for (const loop of loops) {
+    const kind = loop.kind ?? 'LOOP_KIND_UNSPECIFIED';
+    groups.set(kind, [...(groups.get(kind) ?? []), loop]);
+  }
+  const length = (loop: Loop): number => loop.length ?? 0;
+  return [...groups]
+    .filter(([, members]) => members.length > 0)
+    .map(([kind, members]) => [kind, members.sort((a, b) => length(b) - length(a))]);
+}
+
+/** A number for a person: three significant digits. */
+export function short(value: number | undefined): string {
+  if (value === undefined || !Number.isFinite(value)) {
+    return '–';
+  }
+  if (value !== 0 && (Math.abs(value) >= 1e6 || Math.abs(value) < 1e-3)) {
+    return value.toExponential(2);
+  }
+  return String(Number(value.toPrecision(3)));
+}

@@ -1,0 +1,59 @@
+/** The service's report in words. */
+import type { HoleReport, Report } from '../contract.js';
+import { short } from './loops.js';
+
+/** One sentence or two for each hole. */
+export function holeInWords(hole: HoleReport): string[] {
+  const patch = hole.patch ?? {};
+  const faces = (patch.faces ?? 0).toLocaleString('en');
+  const lines = [
+    `Hole ${hole.id}: ${faces} new triangles, area ${short(patch.area)}, on a rim of length ${short(hole.length)}.`,
+    `${stretchInWords(patch.stretchMean, patch.stretchMax)} ${crossingsInWords(patch.selfIntersections ?? 0)}`,
+    shareInWords(patch.networkShare),
+  ];
+  for (const anchor of hole.anchors ?? []) {
+    const beyond = anchor.beyondReach ?? 0;
+    const reach = beyond > 0 ? `; ${short(beyond)} of that is beyond the cloth's reach` : '';
+    lines.push(`An anchor is ${short(anchor.distance)} away from the cloth${reach}.`);
+  }
+  for (const edit of hole.edits ?? []) {
+    lines.push(`A gesture is followed to within ${short(edit.distance)}.`);
+  }
+  return [...lines, ...(hole.notes ?? [])].filter((line) => line !== '');
+}
+
+/** The whole report in one sentence. */
+export function reportInWords(report: Report): string {
+  const filled = report.holes?.length ?? 0;
+  const skipped = report.skipped?.length ?? 0;
+  const left = skipped === 1 ? '1 loop is' : `${skipped} loops are`;
+  return `${count(filled, 'hole')} filled; ${left} left open.`;
+}
+
+function stretchInWords(mean: number | undefined, most: number | undefined): string {
+  if (mean === undefined || most === undefined) {
+    return '';
+  }
+  return `Lengths differ from those of flat cloth by ${percent(mean - 1)} on average, ${percent(most - 1)} at most.`;
+}
+
+function crossingsInWords(crossings: number): string {
+  return crossings === 0 ? 'No triangles cross.' : `${count(crossings, 'pair')} of triangles cross.`;
+}
+
+function shareInWords(share: number | undefined): string {
+  if (share === undefined) {
+    return '';
+  }
+  return share >= 0.995
+    ? 'The network predicts its folds.'
+    : `${percent(share)} of the network's folds, for the rest a fair surface.`;
+}
+
+function percent(share: number): string {
+  return `${Number((Math.abs(share) * 100).toPrecision(2))} %`;
+}
+
+function count(number: number, noun: string): string {
+  return `${number} ${noun}${number === 1 ? '' : 's'}`;
+}

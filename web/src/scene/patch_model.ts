@@ -1,0 +1,238 @@
+/** The new cloth of one hole as three.js shows it: its surface follows the patch's positions, and a hit on it has a uv. */
+import type { Uv } from '../contract.js';
+import type { Patch } from '../model/scan_session.js';
+import {
+  BufferAttribute,
+  BufferGeometry,
+  GLTFLoader,
+  type Intersection,
+  type Material,
+  Mesh,
+  MeshStandardMaterial,
+  Triangle,
+  Vector3,
+} from '../vendor.js';
+import { vectors } from './scan_model.js';
+
+/** A place on new cloth. */
+export interface ClothPoint {
+  readonly hole: number;
+  readonly uv: Uv;
+  /** The triangle of the patch, and where in it. */
+  readonly face: number;
+  readonly weights: readonly [number, number, number];
+  readonly position: Vector3;
+  readonly normal: Vector3;
+}
+
+/** The surfaces of a dressing's GLB, in order of hole id. */
+export async function readSurfaces(glb: ArrayBuffer): Promise<BufferGeometry[]> {
+  const { scene } = await new GLTFLoader().parseAsync(glb, '');
+  scene.updateMatrixWorld(true);
+  const surfaces: BufferGeometry[] = [];
+  scene.traverse((object) => {
+    if (object instanceof Mesh) {
+      surfaces.push((object.geometry as BufferGeometry).applyMatrix4(object.matrixWorld));
+    }
+  });
+  return surfaces;
+}
+
+/** A patch's mesh. */
+export class PatchModel {
+  readonly mesh: Mesh<BufferGeometry, Material>;
+  private readonly corners: Uint32Array;
+  private readonly rim: number;
+  /** The normals of the first state: those at the rim agree with the scan's and stay. */
+  private readonly firstNormals: Float32Array;
+  /** Of each corner: -1 where the surface shows the other side there. */
+  private readonly sides: Float32Array;
+
+  /**
+   * @param patch - Its present positions, and its hole.
+   * @param surface - From the dressing; this object owns it from now on.
+   */
+  constructor(
+    private patch: Patch,
+    surface: BufferGeometry,
+    material: Material,
+  ) {
+    const id = patch.hole.id ?? 0;
+    const first = patch.dressing.positions.get(id) ?? patch.positions;
+    const position = surface.getAttribute('position');
+    this.rim = (patch.hole.rimUvs?.length ?? 0) / 2;
+    this.corners = cornerTable(position.array as Float32Array, first);
+    this.firstNormals = new Float32Array(surface.getAttribute('normal').array);
+    const normals = vertexNormals(first, patch.hole.patchFaces ?? []);
+    this.sides = Float32Array.from(this.corners, (vertex, corner) => {
+      const dot = [0, 1, 2].reduce(
+        (sum, axis) => sum + (normals[3 * vertex + axis] ?? 0) * (this.firstNormals[3 * corner + axis] ?? 0),
+        0,
+      );
+      return dot < 0 ? -1 : 1;
+    });
+    surface.setAttribute('position', vectors(new Float32Array(3 * this.corners.length)));
+    surface.setAttribute('normal', vectors(new Float32Array(3 * this.corners.length)));
+    this.mesh = new Mesh(surface, material);
+    this.mesh.name = `hole ${id}`;
+    this.update(patch);
+  }
+
+  get hole(): number {
+    return this.patch.hole.id ?? 0;
+  }
+
+  /** The patch that is shown. */
+  get shown(): Patch {
+    return this.patch;
+  }
+
+  /** Moves the surface to the positions of another state of the same patch. */
+  update(patch: Patch): void {
+    this.patch = patch;
+    const { geometry } = this.mesh;
+    const [position, normal] = [
+      geometry.getAttribute('position'),
+      geometry.getAttribute('normal'),
+    ] as BufferAttribute[];
+    const normals = vertexNormals(patch.positions, patch.hole.patchFaces ?? []);
+    for (const [corner, vertex] of this.corners.entries()) {
+      const side = this.sides[corner] as number;
+      for (let axis = 0; axis < 3; axis += 1) {
+        const to = 3 * corner + axis;
+        (position as BufferAttribute).array[to] = patch.positions[3 * vertex + axis] as number;
+        (normal as BufferAttribute).array[to] =
+          vertex < this.rim ? (this.firstNormals[to] as number) : side * (normals[3 * vertex + axis] as number);
+      }
+    }
+    (position as BufferAttribute).needsUpdate = true;
+    (normal as BufferAttribute).needsUpdate = true;
+    geometry.computeBoundingSphere();
+    geometry.computeBoundingBox();
+  }
+
+  /** The place of a hit on the mesh. */
+  pointOf(hit: Intersection): ClothPoint | undefined {
+    if (hit.face === null || hit.face === undefined) {
+      return undefined;
+    }
+    const vertices = [hit.face.a, hit.face.b, hit.face.c].map((corner) => this.corners[corner] as number);
+    const [a, b, c] = vertices.map((vertex) => this.vertex(vertex)) as [Vector3, Vector3, Vector3];
+    const weights = Triangle.getBarycoord(hit.point, a, b, c, new Vector3())?.toArray();
+    if (weights === undefined) {
+      return undefined;
+    }
+    const uvs = this.patch.hole.patchUvs ?? [];
+    const uv = [0, 1].map((axis) =>
+      vertices.reduce((sum, vertex, i) => sum + (weights[i] as number) * (uvs[2 * vertex + axis] as number), 0),
+    ) as Uv;
+    return this.at(uv);
+  }
+
+  /** The place with a uv; undefined outside the patch. */
+  at(uv: Uv): ClothPoint | undefined {
+    const { patchFaces = [], patchUvs = [] } = this.patch.hole;
+    const corner = (vertex: number): Uv => [patchUvs[2 * vertex] as number, patchUvs[2 * vertex + 1] as number];
+    for (let face = 0; face + 2 < patchFaces.length; face += 3) {
+      const vertices = patchFaces.slice(face, face + 3) as [number, number, number];
+      const weights = planarWeights(uv, vertices.map(corner) as [Uv, Uv, Uv]);
+      if (weights !== undefined) {
+        return { hole: this.hole, uv, face: face / 3, weights, ...this.located(vertices, weights) };
+      }
+    }
+    return undefined;
+  }
+
+  /** Where a place is now, after the cloth has moved. */
+  follow(point: ClothPoint): Vector3 {
+    const vertices = (this.patch.hole.patchFaces ?? []).slice(3 * point.face, 3 * point.face + 3);
+    return this.located(vertices as [number, number, number], point.weights).position;
+  }
+
+  dispose(): void {
+    this.mesh.geometry.dispose();
+  }
+
+  private located(
+    vertices: readonly [number, number, number],
+    weights: readonly [number, number, number],
+  ): { position: Vector3; normal: Vector3 } {
+    const points = vertices.map((vertex) => this.vertex(vertex)) as [Vector3, Vector3, Vector3];
+    const position = new Vector3();
+    points.forEach((point, i) => position.addScaledVector(point, weights[i] as number));
+    return { position, normal: Triangle.getNormal(...points, new Vector3()) };
+  }
+
+  private vertex(vertex: number): Vector3 {
+    return new Vector3().fromArray(this.patch.positions, 3 * vertex);
+  }
+}
+
+/** Barycentric coordinates of a point in a triangle of the plane; undefined outside it. */
+function planarWeights([u, v]: Uv, [a, b, c]: [Uv, Uv, Uv]): [number, number, number] | undefined {
+  const area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
+  if (area === 0) {
+    return undefined;
+  }
+  const second = ((u - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (v - a[1])) / area;
+  const third = ((b[0] - a[0]) * (v - a[1]) - (u - a[0]) * (b[1] - a[1])) / area;
+  const first = 1 - second - third;
+  const slack = -1e-6;
+  return first >= slack && second >= slack && third >= slack ? [first, second, third] : undefined;
+}
+
+/** For each corner of the surface, the patch vertex at its position: the same numbers, or else the nearest one. */
+function cornerTable(corners: Float32Array, vertices: Float32Array): Uint32Array {
+  const keyOf = (values: Float32Array, at: number): string => values.subarray(3 * at, 3 * at + 3).join();
+  const exact = new Map<string, number>();
+  for (let vertex = 0; vertex < vertices.length / 3; vertex += 1) {
+    exact.set(keyOf(vertices, vertex), vertex);
+  }
+  return Uint32Array.from({ length: corners.length / 3 }, (_, corner) => {
+    return exact.get(keyOf(corners, corner)) ?? nearest(vertices, corners.subarray(3 * corner, 3 * corner + 3));
+  });
+}
+
+function nearest(vertices: Float32Array, point: Float32Array): number {
+  let best = { vertex: 0, distance: Number.POSITIVE_INFINITY };
+  for (let vertex = 0; vertex < vertices.length / 3; vertex += 1) {
+    const distance = [0, 1, 2].reduce((sum, axis) => {
+      return sum + ((vertices[3 * vertex + axis] as number) - (point[axis] as number)) ** 2;
+    }, 0);
+    if (distance < best.distance) {
+      best = { vertex, distance };
+    }
+  }
+  return best.vertex;
+}
+
+/** Unit normals of vertices: the mean of their faces', weighted by area. */
+function vertexNormals(positions: Float32Array, faces: readonly number[]): Float32Array {
+  const normals = new Float32Array(positions.length);
+  const at = (vertex: number, axis: number): number => positions[3 * vertex + axis] as number;
+  for (let face = 0; face + 2 < faces.length; face += 3) {
+    const [a, b, c] = [faces[face], faces[face + 1], faces[face + 2]] as [number, number, number];
+    const [x1, y1, z1] = [at(b, 0) - at(a, 0), at(b, 1) - at(a, 1), at(b, 2) - at(a, 2)];
+    const [x2, y2, z2] = [at(c, 0) - at(a, 0), at(c, 1) - at(a, 1), at(c, 2) - at(a, 2)];
+    for (const vertex of [a, b, c]) {
+      normals[3 * vertex] = (normals[3 * vertex] as number) + y1 * z2 - z1 * y2;
+      normals[3 * vertex + 1] = (normals[3 * vertex + 1] as number) + z1 * x2 - x1 * z2;
+      normals[3 * vertex + 2] = (normals[3 * vertex + 2] as number) + x1 * y2 - y1 * x2;
+    }
+  }
+  for (let at = 0; at < normals.length; at += 3) {
+    const length = Math.hypot(...normals.subarray(at, at + 3)) || 1;
+    for (let axis = 0; axis < 3; axis += 1) {
+      normals[at + axis] = (normals[at + axis] as number) / length;
+    }
+  }
+  return normals;
+}
+
+/** New cloth in a colour of its own. */
+export const TINT = 0xf0a35e;
+
+/** The material of a patch that continues the scan's: its own copy, so that the scan's can be exchanged. */
+export function blendedMaterial(scan: Material | undefined): Material {
+  return scan?.clone() ?? new MeshStandardMaterial({ color: 0xb9bec6 });
+}

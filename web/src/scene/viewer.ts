@@ -1,0 +1,324 @@
+/** The picture: a camera around the scan, the scan, its rims and the new cloth; drawn only when something has changed. */
+import type { Loop } from '../contract.js';
+import { byKind } from '../model/loops.js';
+import type { Patch } from '../model/scan_session.js';
+import {
+  Box3,
+  DirectionalLight,
+  HemisphereLight,
+  type Material,
+  OrbitControls,
+  PerspectiveCamera,
+  Plane,
+  Raycaster,
+  Scene,
+  Sphere,
+  Vector2,
+  Vector3,
+  WebGLRenderer,
+} from '../vendor.js';
+import { linesOfLoops } from './boundary.js';
+import { Marks } from './marks.js';
+import { type ClothPoint, PatchModel, TINT, blendedMaterial, readSurfaces } from './patch_model.js';
+import { Rims } from './rims.js';
+import { ScanModel, type Shading, plainMaterial } from './scan_model.js';
+
+/** What the person chose to see. */
+export interface Look {
+  readonly shading: Shading;
+  /** Whether the new cloth has a colour of its own. */
+  readonly tinted: boolean;
+  /** Whether the scan is shown without its new cloth. */
+  readonly before: boolean;
+  /** The share of the picture's width, from the left, that shows the scan without its new cloth. */
+  readonly split: number;
+}
+
+const FIRST_LOOK: Look = { shading: 'textured', tinted: true, before: false, split: 0 };
+
+/** What is under the pointer. */
+export interface Hit {
+  readonly position: Vector3;
+  /** The place on new cloth; undefined on the scan. */
+  readonly cloth: ClothPoint | undefined;
+}
+
+/** Draws into a canvas that fills `host`. */
+export class Viewer {
+  readonly camera = new PerspectiveCamera(35, 1, 0.01, 100);
+  readonly controls: OrbitControls;
+  readonly marks = new Marks();
+  private readonly renderer: WebGLRenderer;
+  private readonly scene = new Scene();
+  private readonly raycaster = new Raycaster();
+  private readonly resized: ResizeObserver;
+  private scan: ScanModel | undefined;
+  private rims: Rims | undefined;
+  private patches: PatchModel[] = [];
+  private look = FIRST_LOOK;
+  /** Around the scan. */
+  private sphere: Sphere | undefined;
+  private frameAsked = 0;
+
+  constructor(private readonly host: HTMLElement) {
+    this.renderer = new WebGLRenderer({ antialias: true, alpha: true });
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.canvas.tabIndex = 0;
+    host.append(this.canvas);
+    this.controls = new OrbitControls(this.camera, this.canvas);
+    this.controls.enableDamping = false;
+    this.controls.addEventListener('change', () => this.draw());
+    const headlight = new DirectionalLight(0xffffff, 1.9);
+    // From the side, so that folds show.
+    headlight.position.set(1, 1.2, 0.9);
+    this.camera.add(headlight);
+    this.scene.add(this.camera, new HemisphereLight(0xffffff, 0x8d97a5, 1), this.marks.group);
+    this.resized = new ResizeObserver(() => this.resize());
+    this.resized.observe(host);
+    this.canvas.addEventListener('webglcontextrestored', () => this.draw());
+    this.resize();
+  }
+
+  get canvas(): HTMLCanvasElement {
+    return this.renderer.domElement;
+  }
+
+  /** The name of what draws, for tests and reports. */
+  get rendererName(): string {
+    const gl = this.renderer.getContext();
+    const info = gl.getExtension('WEBGL_debug_renderer_info');
+    return String(gl.getParameter(info?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER));
+  }
+
+  /** Shows another scan in place of the one before, and frames it. */
+  async showScan(bytes: ArrayBuffer, loops: readonly Loop[]): Promise<void> {
+    const scan = await ScanModel.load(bytes.slice(0));
+    this.clear();
+    this.scan = scan;
+    this.scene.add(scan.root);
+    const size = scan.bounds.getBoundingSphere(new Sphere()).radius || 1;
+    this.rims = new Rims(loops, linesOfLoops(loops, scan.boundaryLines()), size);
+    this.scene.add(this.rims.group);
+    scan.setShading(this.look.shading);
+    const largest = byKind(loops)[0]?.[1][0]?.id ?? 0;
+    this.lookAt(scan.bounds, this.rims.viewOf(largest)?.front ?? new Vector3(0.5, 0.5, 1));
+  }
+
+  /** Draws the chosen loops wider. */
+  chooseLoops(chosen: ReadonlySet<number>): void {
+    this.rims?.choose(chosen);
+    this.draw();
+  }
+
+  /** Shows new cloth. Where it is a state of the same patches, only its positions are sent to the graphics card. */
+  async showPatches(patches: readonly Patch[]): Promise<void> {
+    const same =
+      patches.length === this.patches.length &&
+      patches.every((patch, i) => this.patches[i]?.shown.dressing === patch.dressing);
+    if (same) {
+      patches.forEach((patch, i) => {
+        if (this.patches[i]?.shown !== patch) {
+          this.patches[i]?.update(patch);
+        }
+      });
+    } else {
+      const dressing = patches[0]?.dressing;
+      const surfaces = dressing === undefined ? [] : await readSurfaces(dressing.glb.slice(0));
+      this.clearPatches();
+      this.patches = patches.flatMap((patch, i) => {
+        const surface = surfaces[i];
+        return surface === undefined ? [] : [new PatchModel(patch, surface, this.materialOf(patch))];
+      });
+      this.scene.add(...this.patches.map(({ mesh }) => mesh));
+    }
+    this.draw();
+  }
+
+  /** Changes how things are drawn. */
+  setLook(change: Partial<Look>): void {
+    const before = this.look;
+    this.look = { ...before, ...change };
+    if (before.shading !== this.look.shading) {
+      this.scan?.setShading(this.look.shading);
+    }
+    if (before.shading !== this.look.shading || before.tinted !== this.look.tinted) {
+      for (const patch of this.patches) {
+        patch.mesh.material.dispose();
+        patch.mesh.material = this.materialOf(patch.shown);
+      }
+    }
+    this.draw();
+  }
+
+  /** Moves the camera so that all of the scan fills the picture; or one loop, seen from its front. */
+  frame(loop?: number): void {
+    const view = loop === undefined ? undefined : this.rims?.viewOf(loop);
+    this.lookAt(view?.bounds ?? this.scan?.bounds ?? new Box3(), view?.front ?? new Vector3());
+  }
+
+  /** Turns the camera about a point from now on. */
+  pivotAt(point: Vector3): void {
+    this.controls.target.copy(point);
+    this.controls.update();
+    this.draw();
+  }
+
+  /** What is under a point of the window. */
+  pick(clientX: number, clientY: number): Hit | undefined {
+    this.aim(clientX, clientY);
+    const patches = this.look.before ? [] : this.patches;
+    const cloth = this.raycaster.intersectObjects(
+      patches.map(({ mesh }) => mesh),
+      false,
+    )[0];
+    const scan = this.scan?.pick(this.raycaster);
+    if (cloth !== undefined && cloth.distance <= (scan?.distance ?? Number.POSITIVE_INFINITY)) {
+      const patch = this.patches.find(({ mesh }) => mesh === cloth.object);
+      return { position: cloth.point, cloth: patch?.pointOf(cloth) };
+    }
+    return scan && { position: scan.point, cloth: undefined };
+  }
+
+  /** Where the pointer's ray meets the plane through a point that faces the camera. */
+  onScreenPlane(clientX: number, clientY: number, through: Vector3): Vector3 | undefined {
+    this.aim(clientX, clientY);
+    const plane = new Plane().setFromNormalAndCoplanarPoint(this.camera.getWorldDirection(new Vector3()), through);
+    return this.raycaster.ray.intersectPlane(plane, new Vector3()) ?? undefined;
+  }
+
+  /** The point of a line that the pointer's ray comes nearest to. */
+  onLine(clientX: number, clientY: number, through: Vector3, direction: Vector3): Vector3 {
+    this.aim(clientX, clientY);
+    const { origin, direction: ray } = this.raycaster.ray;
+    const between = through.clone().sub(origin);
+    const cosine = direction.dot(ray);
+    const along = (cosine * ray.dot(between) - direction.dot(between)) / Math.max(1 - cosine * cosine, 1e-6);
+    return through.clone().addScaledVector(direction, along);
+  }
+
+  /** The patch of a hole. */
+  patchOf(hole: number): PatchModel | undefined {
+    return this.patches.find((patch) => patch.hole === hole);
+  }
+
+  /** Draws at the next frame. */
+  draw(): void {
+    if (this.frameAsked === 0) {
+      this.frameAsked = requestAnimationFrame(() => {
+        this.frameAsked = 0;
+        this.drawNow();
+      });
+    }
+  }
+
+  dispose(): void {
+    cancelAnimationFrame(this.frameAsked);
+    this.clear();
+    this.resized.disconnect();
+    this.controls.dispose();
+    this.renderer.dispose();
+    this.canvas.remove();
+  }
+
+  private drawNow(): void {
+    this.fitDepth();
+    this.marks.fit(this.camera, this.host.clientHeight);
+    const { clientWidth: width, clientHeight: height } = this.host;
+    const split = Math.round(this.look.split * width);
+    this.renderer.setScissorTest(split > 0);
+    this.drawPart(split > 0 ? [split, width - split] : [0, width], height, !this.look.before);
+    if (split > 0) {
+      this.drawPart([0, split], height, false);
+    }
+  }
+
+  private drawPart([left, width]: [number, number], height: number, mended: boolean): void {
+    if (this.look.split > 0) {
+      this.renderer.setScissor(left, 0, width, height);
+    }
+    this.patches.forEach(({ mesh }) => (mesh.visible = mended));
+    this.renderer.render(this.scene, this.camera);
+    this.patches.forEach(({ mesh }) => (mesh.visible = true));
+  }
+
+  /** Moves the camera until a box fills the picture. @param from - Direction to look from; zero: the present one. */
+  private lookAt(box: Box3, from: Vector3): void {
+    const { center, radius } = box.getBoundingSphere(new Sphere());
+    if (box.isEmpty() || !(radius > 0)) {
+      return;
+    }
+    const narrow = Math.min(1, this.camera.aspect);
+    const distance = (1.1 * radius) / Math.sin((this.camera.fov * Math.PI) / 360) / narrow;
+    const away = from.lengthSq() > 0 ? from.clone() : this.camera.position.clone().sub(this.controls.target);
+    this.controls.target.copy(center);
+    this.camera.position.copy(center).addScaledVector(away.normalize(), distance);
+    this.fitDepth();
+    this.controls.update();
+    this.draw();
+  }
+
+  private aim(clientX: number, clientY: number): void {
+    const { left, top, width, height } = this.canvas.getBoundingClientRect();
+    const device = new Vector2(((clientX - left) / width) * 2 - 1, 1 - ((clientY - top) / height) * 2);
+    this.camera.updateMatrixWorld();
+    this.raycaster.setFromCamera(device, this.camera);
+  }
+
+  private materialOf({ hole }: Patch): Material {
+    const { shading, tinted } = this.look;
+    if (tinted) {
+      return plainMaterial(TINT, shading);
+    }
+    if (shading !== 'textured') {
+      return plainMaterial(0xb9bec6, shading);
+    }
+    return blendedMaterial(this.scan?.materialNear(new Vector3().fromArray(hole.rimPositions ?? [0, 0, 0])));
+  }
+
+  /** Near and far planes that hold the whole scan, whatever its unit. */
+  private fitDepth(): void {
+    if (this.scan !== undefined) {
+      this.sphere ??= this.scan.bounds.getBoundingSphere(new Sphere());
+      const { center, radius } = this.sphere;
+      const distance = this.camera.position.distanceTo(center);
+      this.camera.far = distance + 4 * radius;
+      this.camera.near = Math.max(distance - 4 * radius, this.camera.far / 5000);
+      this.camera.updateProjectionMatrix();
+    }
+  }
+
+  private resize(): void {
+    const { clientWidth: width, clientHeight: height } = this.host;
+    if (width > 0 && height > 0) {
+      this.renderer.setSize(width, height);
+      this.camera.aspect = width / height;
+      this.camera.updateProjectionMatrix();
+      this.drawNow();
+    }
+  }
+
+  private clear(): void {
+    this.clearPatches();
+    this.marks.clear();
+    if (this.scan !== undefined) {
+      this.scene.remove(this.scan.root);
+      this.scan.dispose();
+    }
+    if (this.rims !== undefined) {
+      this.scene.remove(this.rims.group);
+      this.rims.dispose();
+    }
+    this.scan = undefined;
+    this.rims = undefined;
+    this.sphere = undefined;
+  }
+
+  private clearPatches(): void {
+    for (const patch of this.patches) {
+      this.scene.remove(patch.mesh);
+      patch.mesh.material.dispose();
+      patch.dispose();
+    }
+    this.patches = [];
+  }
+}

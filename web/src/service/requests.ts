@@ -1,0 +1,94 @@
+/** Sends requests: uploads with progress, waiting where the service asks for it, problem documents as errors. */
+import { ProblemError, problemOf } from './problem.js';
+
+/** Tries of one request that the service answers with 503. */
+const MOST_TRIES = 5;
+/** Longest wait before another try, in seconds. */
+const LONGEST_WAIT = 60;
+
+/** An answer with a status below 400. */
+export interface Answer {
+  readonly contentType: string;
+  readonly body: ArrayBuffer;
+}
+
+/** What a caller may be told while a request is under way. */
+export interface Progress {
+  /** The share of the body that has been sent, from 0 to 1. */
+  onSent?: (share: number) => void;
+  /** The service is busy; the request is sent again after so many seconds. */
+  onWait?: (seconds: number) => void;
+  signal?: AbortSignal;
+}
+
+/** Sends `body` by XMLHttpRequest, which unlike `fetch` tells how much was sent. Waits and tries again on 503. */
+export function upload(url: URL, body: FormData, progress: Progress = {}): Promise<Answer> {
+  return patiently(progress, () => uploadOnce(url, body, progress));
+}
+
+/** Sends a request by `fetch`. Waits and tries again on 503. */
+export function send(url: URL, init: RequestInit, progress: Progress = {}): Promise<Answer> {
+  return patiently(progress, async () => {
+    const response = await fetch(url, { ...init, signal: progress.signal ?? null });
+    if (!response.ok) {
+      throw problemOf(response.status, response.headers.get('retry-after'), await response.text());
+    }
+    return { contentType: response.headers.get('content-type') ?? '', body: await response.arrayBuffer() };
+  });
+}
+
+/** The answer's body as JSON. */
+export function jsonOf<T>(answer: Answer): T {
+  return JSON.parse(new TextDecoder().decode(answer.body)) as T;
+}
+
+async function patiently(progress: Progress, attempt: () => Promise<Answer>): Promise<Answer> {
+  for (let tries = 1; ; tries += 1) {
+    try {
+      return await attempt();
+    } catch (error) {
+      const wait = error instanceof ProblemError && error.status === 503 ? error.retryAfter : undefined;
+      if (wait === undefined || wait > LONGEST_WAIT || tries === MOST_TRIES) {
+        throw error;
+      }
+      progress.onWait?.(wait);
+      await pause(wait, progress.signal);
+    }
+  }
+}
+
+function pause(seconds: number, signal: AbortSignal | undefined): Promise<void> {
+  return new Promise((resolve, reject) => {
+    const timer = setTimeout(resolve, seconds * 1000);
+    signal?.addEventListener('abort', () => {
+      clearTimeout(timer);
+      reject(new DOMException('stopped', 'AbortError'));
+    });
+  });
+}
+
+function uploadOnce(url: URL, body: FormData, { onSent, signal }: Progress): Promise<Answer> {
+  return new Promise((resolve, reject) => {
+    const request = new XMLHttpRequest();
+    request.open('POST', url);
+    request.responseType = 'arraybuffer';
+    request.upload.onprogress = (event) => {
+      if (event.lengthComputable && event.total > 0) {
+        onSent?.(event.loaded / event.total);
+      }
+    };
+    request.onload = () => {
+      const answer = request.response as ArrayBuffer;
+      if (request.status < 400) {
+        resolve({ contentType: request.getResponseHeader('content-type') ?? '', body: answer });
+      } else {
+        const text = new TextDecoder().decode(answer);
+        reject(problemOf(request.status, request.getResponseHeader('retry-after'), text));
+      }
+    };
+    request.onerror = () => reject(new Error('The service cannot be reached, or it closed the connection.'));
+    request.onabort = () => reject(new DOMException('stopped', 'AbortError'));
+    signal?.addEventListener('abort', () => request.abort());
+    request.send(body);
+  });
+}

@@ -1,0 +1,94 @@
+/** The service's requests that the editor makes, as functions of a typed client. */
+import type { AnchorFound, AnchorQuery, Constraints, HolesReport, Info, Report, Session } from '../contract.js';
+import { partsOf } from './multipart.js';
+import { type Answer, type Progress, jsonOf, send, upload } from './requests.js';
+
+/** Patches as positions: `x, y, z` of every patch vertex, hole after hole, in order of id. */
+export interface MendedPositions {
+  readonly positions: Float32Array;
+  readonly report: Report;
+}
+
+/** A client of the service at one address. */
+export class Service {
+  /** @param base - The address below which the service's paths are. */
+  constructor(readonly base: URL) {}
+
+  /** Version and limits. */
+  async info(): Promise<Info> {
+    return jsonOf(await send(this.at('info'), {}));
+  }
+
+  /** Every boundary loop of a scan. */
+  async holes(scan: Blob, progress: Progress): Promise<HolesReport> {
+    const form = new FormData();
+    form.append('scan', scan, 'scan');
+    return jsonOf(await upload(this.at('holes'), form, progress));
+  }
+
+  /** Opens a session on some holes of a scan. */
+  async openSession(scan: Blob, constraints: Constraints, progress: Progress): Promise<Session> {
+    const form = new FormData();
+    form.append('scan', scan, 'scan');
+    form.append('constraints', new Blob([JSON.stringify(constraints)], { type: 'application/json' }), 'constraints');
+    return jsonOf(await upload(this.at('sessions'), form, progress));
+  }
+
+  /** The patches' positions under constraints, without a report: the fastest answer. */
+  async positions(session: string, constraints: Constraints, progress: Progress): Promise<Float32Array> {
+    const answer = await this.inpaint(session, constraints, 'application/octet-stream', progress);
+    return new Float32Array(answer.body);
+  }
+
+  /** The patches' positions under constraints, and the report. */
+  async mend(session: string, constraints: Constraints, progress: Progress): Promise<MendedPositions> {
+    const accept = 'multipart/mixed, application/octet-stream;q=0.9';
+    const parts = await this.inpaint(session, constraints, accept, progress);
+    const { report, patches } = reportAndPatches(parts);
+    return { report, positions: new Float32Array(patches.buffer) };
+  }
+
+  /** The patches as a GLB, with texture coordinates, colours and normals. */
+  async patches(session: string, constraints: Constraints, progress: Progress): Promise<ArrayBuffer> {
+    return (await this.inpaint(session, constraints, 'model/gltf-binary', progress)).body;
+  }
+
+  /** Where on a hole's chart a point in space belongs. */
+  async optimizeAnchor(session: string, query: AnchorQuery, progress: Progress): Promise<AnchorFound> {
+    return jsonOf(await send(this.at(`sessions/${session}/optimize-anchor`), jsonBody(query), progress));
+  }
+
+  /** The whole scan, mended as the session was asked last. */
+  async result(session: string, progress: Progress): Promise<Blob> {
+    const answer = await send(this.at(`sessions/${session}/result`), {}, progress);
+    return new Blob([answer.body], { type: answer.contentType });
+  }
+
+  /** Ends a session; nothing waits for it, and it may be gone already. */
+  close(session: string): void {
+    fetch(this.at(`sessions/${session}`), { method: 'DELETE', keepalive: true }).catch(() => undefined);
+  }
+
+  private inpaint(session: string, constraints: Constraints, accept: string, progress: Progress): Promise<Answer> {
+    const request = jsonBody(constraints);
+    request.headers = { ...request.headers, accept };
+    return send(this.at(`sessions/${session}/inpaint`), request, progress);
+  }
+
+  private at(path: string): URL {
+    return new URL(path, this.base);
+  }
+}
+
+function jsonBody(message: unknown): RequestInit {
+  return { method: 'POST', headers: { 'content-type': 'application/json' }, body: JSON.stringify(message) };
+}
+
+function reportAndPatches(answer: Answer): { report: Report; patches: Uint8Array<ArrayBuffer> } {
+  const parts = partsOf(answer.contentType, answer.body);
+  const [report, patches] = [parts.get('report'), parts.get('patches')];
+  if (report === undefined || patches === undefined) {
+    throw new Error('the answer has no report or no patches');
+  }
+  return { report: JSON.parse(new TextDecoder().decode(report.body)) as Report, patches: patches.body };
+}

@@ -1,0 +1,350 @@
+/** `<darn-editor>`: the whole editor, as it is served at `/`. */
+import { Editor } from '../model/editor.js';
+import { Service } from '../service/service.js';
+import { type TemplateResult, LitElement, css, html, nothing } from '../vendor.js';
+import { download } from './download.js';
+import './holes_panel.js';
+import './look_panel.js';
+import './report_panel.js';
+import { Stage } from './stage.js';
+import { shared } from './styles.js';
+
+/** What the person may drop or pick. */
+const SCAN_FILE = /\.(glb|gltf)$/i;
+
+export class EditorElement extends LitElement {
+  static override styles = [
+    shared,
+    css`
+      :host {
+        display: grid;
+        grid-template: auto 1fr / 1fr 340px;
+        height: 100%;
+        background: var(--surface);
+      }
+      header {
+        grid-column: 1 / -1;
+        display: flex;
+        flex-wrap: wrap;
+        gap: 6px;
+        align-items: center;
+        padding: 6px 10px;
+        border-bottom: 1px solid var(--line);
+      }
+      h1 {
+        margin: 0 0.75rem 0 0;
+        font-size: 1.05rem;
+      }
+      header .space {
+        flex: 1;
+      }
+      main {
+        position: relative;
+        min-height: 0;
+      }
+      darn-stage {
+        height: 100%;
+      }
+      aside {
+        overflow: auto;
+        padding: 12px;
+        border-left: 1px solid var(--line);
+        background: var(--raised);
+      }
+      aside > * {
+        display: block;
+        margin-bottom: 1.25rem;
+      }
+      .welcome {
+        position: absolute;
+        inset: 0;
+        display: flex;
+        flex-direction: column;
+        align-items: center;
+        justify-content: center;
+        gap: 12px;
+        text-align: center;
+        padding: 1rem;
+      }
+      .welcome p {
+        max-width: 34rem;
+        margin: 0;
+      }
+      .over {
+        outline: 4px dashed var(--accent);
+        outline-offset: -10px;
+      }
+      .notice {
+        position: absolute;
+        left: 12px;
+        right: 12px;
+        bottom: 12px;
+        padding: 8px 12px;
+        border: 1px solid var(--line);
+        border-radius: 6px;
+        background: var(--surface);
+      }
+      .problem {
+        border-color: var(--error);
+        background: var(--error-surface);
+        color: var(--error);
+        white-space: pre-line;
+      }
+      progress {
+        width: 100%;
+        height: 8px;
+        accent-color: var(--accent);
+      }
+      .hidden {
+        position: absolute;
+        width: 1px;
+        height: 1px;
+        overflow: hidden;
+        clip-path: inset(50%);
+      }
+      @media (max-width: 720px) {
+        :host {
+          grid-template: auto 55% 1fr / 1fr;
+        }
+        aside {
+          border-left: 0;
+          border-top: 1px solid var(--line);
+        }
+      }
+    `,
+  ];
+
+  readonly editor = new Editor(new Service(new URL('.', document.baseURI)));
+  private dragging = false;
+  private readonly changed = (): void => this.requestUpdate();
+
+  override connectedCallback(): void {
+    super.connectedCallback();
+    this.editor.addEventListener('change', this.changed);
+    addEventListener('dragover', this.dragOver);
+    addEventListener('dragleave', this.dragLeave);
+    addEventListener('drop', this.drop);
+    addEventListener('keydown', this.keyDown);
+    addEventListener('keyup', this.keyUp);
+    addEventListener('hashchange', this.openNamed);
+    this.openNamed();
+  }
+
+  override disconnectedCallback(): void {
+    super.disconnectedCallback();
+    this.editor.removeEventListener('change', this.changed);
+    removeEventListener('dragover', this.dragOver);
+    removeEventListener('dragleave', this.dragLeave);
+    removeEventListener('drop', this.drop);
+    removeEventListener('keydown', this.keyDown);
+    removeEventListener('keyup', this.keyUp);
+    removeEventListener('hashchange', this.openNamed);
+  }
+
+  protected override render(): TemplateResult {
+    const { editor } = this;
+    const { scan, work } = editor;
+    return html`
+      <header>
+        <h1>darn</h1>
+        <button @click=${this.pick}>Open a scan</button>
+        <button @click=${this.openExample} ?hidden=${scan === undefined}>Open the example</button>
+        <span class="quiet">${scan?.name ?? ''}</span>
+        <span class="space"></span>
+        <button
+          id="undo"
+          ?disabled=${editor.undoLabel === undefined || work !== undefined}
+          title=${editor.undoLabel ? `Undo: ${editor.undoLabel} (Ctrl+Z)` : 'Nothing to undo'}
+          @click=${() => editor.undo()}
+        >
+          Undo
+        </button>
+        <button
+          id="redo"
+          ?disabled=${editor.redoLabel === undefined || work !== undefined}
+          title=${editor.redoLabel ? `Redo: ${editor.redoLabel} (Ctrl+Shift+Z)` : 'Nothing to redo'}
+          @click=${() => editor.redo()}
+        >
+          Redo
+        </button>
+        <button
+          id="save"
+          class="main"
+          ?disabled=${editor.step.holes.length === 0 || work !== undefined}
+          @click=${this.save}
+        >
+          Save the scan
+        </button>
+        <input id="file" type="file" accept=".glb,.gltf" hidden @change=${this.picked} />
+      </header>
+      <main class=${this.dragging ? 'over' : ''}>
+        <darn-stage .editor=${editor}></darn-stage>
+        ${scan === undefined && work === undefined ? this.welcome() : nothing} ${this.notices()}
+      </main>
+      <aside @darn-frame=${this.frame} @darn-look=${this.look}>
+        ${
+          scan === undefined
+            ? html`<p class="quiet">The holes of the scan will be listed here.</p>`
+            : html`
+                <darn-holes .editor=${editor}></darn-holes>
+                <darn-look .editor=${editor}></darn-look>
+                <darn-report .editor=${editor}></darn-report>
+              `
+        }
+      </aside>
+      <div class="hidden" role="status" aria-live="polite">${editor.work?.label ?? editor.message}</div>
+    `;
+  }
+
+  private welcome(): TemplateResult {
+    return html`
+      <div class="welcome">
+        <h2>Mend a scan of cloth</h2>
+        <p>
+          Drop a glTF file here (GLB, or glTF with its data inside). The service finds its holes and fills them with
+          cloth that continues the folds around them. The scan itself stays as it is.
+        </p>
+        <div class="row">
+          <button class="main" @click=${this.pick}>Open a scan</button>
+          <button id="example" @click=${this.openExample}>Try the example</button>
+        </div>
+      </div>
+    `;
+  }
+
+  private notices(): TemplateResult | typeof nothing {
+    const { work, problem } = this.editor;
+    if (problem !== undefined) {
+      return html`
+        <div class="notice problem" role="alert">
+          ${problem}
+          <button @click=${() => this.editor.clearProblem()}>Close</button>
+        </div>
+      `;
+    }
+    if (work === undefined) {
+      return nothing;
+    }
+    return html`
+      <div class="notice">
+        <div class="row">
+          ${work.label} …
+          <button @click=${() => work.stop.abort()}>Stop</button>
+        </div>
+        <progress
+          aria-label=${work.label}
+          .value=${work.share ?? 0}
+          ?indeterminate=${work.share === undefined}
+        ></progress>
+      </div>
+    `;
+  }
+
+  private get stage(): Stage | null {
+    return this.renderRoot.querySelector<Stage>('darn-stage');
+  }
+
+  private readonly pick = (): void => this.renderRoot.querySelector<HTMLInputElement>('#file')?.click();
+
+  private readonly picked = (event: Event): void => {
+    const input = event.target as HTMLInputElement;
+    this.openFiles([...(input.files ?? [])]);
+    // So that the same file can be picked again.
+    input.value = '';
+  };
+
+  private openFiles(files: readonly File[]): void {
+    const scan = files.find((file) => SCAN_FILE.test(file.name)) ?? files[0];
+    if (scan !== undefined) {
+      void this.editor.open(scan, scan.name);
+    }
+  }
+
+  private readonly openExample = (): void => {
+    void this.editor.openAddress(new URL('editor/scarf_hole.glb', document.baseURI));
+  };
+
+  /** `#scan=URL` opens the scan at an address. */
+  private readonly openNamed = (): void => {
+    const named = new URLSearchParams(location.hash.slice(1)).get('scan');
+    if (named === null) {
+      return;
+    }
+    try {
+      void this.editor.openAddress(new URL(named, document.baseURI));
+    } catch {
+      this.editor.report(new Error(`${named} is not an address.`));
+    }
+  };
+
+  private readonly save = async (): Promise<void> => {
+    const result = await this.editor.result();
+    if (result !== undefined) {
+      const name = this.editor.scan?.name ?? 'scan.glb';
+      download(
+        result,
+        name.replace(/(\.[a-z]+)?$/i, (ending) => `.mended${ending || '.glb'}`),
+      );
+    }
+  };
+
+  private readonly dragOver = (event: DragEvent): void => {
+    event.preventDefault();
+    this.setDragging(true);
+  };
+
+  private readonly dragLeave = (): void => this.setDragging(false);
+
+  private readonly drop = (event: DragEvent): void => {
+    event.preventDefault();
+    this.setDragging(false);
+    this.openFiles([...(event.dataTransfer?.files ?? [])]);
+  };
+
+  private setDragging(dragging: boolean): void {
+    this.dragging = dragging;
+    this.requestUpdate();
+  }
+
+  private readonly frame = (event: CustomEvent<number>): void => this.stage?.viewer?.frame(event.detail);
+
+  private readonly look = (event: CustomEvent<object>): void => this.stage?.viewer?.setLook(event.detail);
+
+  private readonly keyDown = (event: KeyboardEvent): void => {
+    const key = event.key.toLowerCase();
+    if ((event.ctrlKey || event.metaKey) && (key === 'z' || key === 'y') && !isTyping(event)) {
+      event.preventDefault();
+      if (key === 'y' || event.shiftKey) {
+        this.editor.redo();
+      } else {
+        this.editor.undo();
+      }
+      return;
+    }
+    if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event)) {
+      return;
+    }
+    if (key === 'f') {
+      this.stage?.viewer?.frame();
+    } else if (key === 'b') {
+      this.stage?.viewer?.setLook({ before: true });
+    }
+  };
+
+  private readonly keyUp = (event: KeyboardEvent): void => {
+    if (event.key.toLowerCase() === 'b') {
+      this.stage?.viewer?.setLook({ before: false });
+    }
+  };
+}
+
+/** Whether a key goes into a field. */
+function isTyping(event: KeyboardEvent): boolean {
+  const target = event.composedPath()[0];
+  return (
+    target instanceof HTMLTextAreaElement ||
+    (target instanceof HTMLInputElement && !['checkbox', 'radio', 'range', 'button'].includes(target.type))
+  );
+}
+
+customElements.define('darn-editor', EditorElement);

@@ -1,0 +1,127 @@
+/** The list of boundary loops: which to fill, how long they are, why some are left as they are. */
+import type { Loop } from '../contract.js';
+import { byKind, isHole, short, styleOf } from '../model/loops.js';
+import { type TemplateResult, css, html, nothing, svg } from '../vendor.js';
+import { Panel } from './panel.js';
+
+/** The event `darn-frame` asks the picture to show the loop in `detail`. */
+export class HolesPanel extends Panel {
+  static override styles = [
+    Panel.styles,
+    css`
+      ul {
+        margin: 0 0 0.75rem;
+        padding: 0;
+        list-style: none;
+        max-height: 14rem;
+        overflow: auto;
+      }
+      li {
+        display: grid;
+        grid-template-columns: 28px 1fr auto;
+        align-items: center;
+        min-height: 28px;
+      }
+      li button {
+        border-color: transparent;
+        background: none;
+        text-align: left;
+      }
+      .why {
+        grid-column: 2 / -1;
+        padding: 0 10px 4px;
+      }
+      svg {
+        vertical-align: middle;
+        margin-right: 6px;
+      }
+    `,
+  ].flat();
+
+  /** The last one that was clicked: shift-click chooses all from it on. */
+  private lastClicked: number | undefined;
+
+  protected override render(): TemplateResult {
+    const { scan, chosen, work } = this.editor;
+    const loops = scan?.loops ?? [];
+    const holes = loops.filter(isHole).map((loop) => loop.id ?? 0);
+    return html`
+      <h2>Holes</h2>
+      ${byKind(loops).map(([kind, members]) => this.group(kind, members))}
+      ${holes.length === 0 ? html`<p>This scan has no holes to fill.</p>` : nothing}
+      <div class="row">
+        <button class="main" id="mend" ?disabled=${chosen.size === 0 || work !== undefined} @click=${this.mend}>
+          Mend ${chosen.size === 1 ? '1 hole' : `${chosen.size} holes`}
+        </button>
+        <button ?disabled=${holes.length === 0} @click=${() => this.editor.choose(new Set(holes))}>All</button>
+        <button ?disabled=${chosen.size === 0} @click=${() => this.editor.choose(new Set())}>None</button>
+      </div>
+    `;
+  }
+
+  private group(kind: string, members: readonly Loop[]): TemplateResult {
+    const style = styleOf(kind);
+    const dashes = { solid: '', dashed: '7 4', dotted: '2 4' }[style.line];
+    const sample = svg`<svg width="30" height="8" aria-hidden="true">
+      <line x1="0" y1="4" x2="30" y2="4" stroke=${style.color} stroke-width="3" stroke-dasharray=${dashes} />
+    </svg>`;
+    return html`
+      <h3>${sample}${style.plural} (${members.length})</h3>
+      <ul aria-label=${style.plural}>
+        ${members.map((loop) => this.item(loop, members))}
+      </ul>
+    `;
+  }
+
+  private item(loop: Loop, group: readonly Loop[]): TemplateResult {
+    const id = loop.id ?? 0;
+    const { step, skipped, chosen } = this.editor;
+    const filled = step.holes.includes(id);
+    const skip = skipped.find((it) => it.id === id && it.code !== 'not_selected');
+    const name = `${styleOf(loop.kind ?? '').singular} ${id}`;
+    return html`
+      <li>
+        ${
+          isHole(loop)
+            ? html`<input
+                type="checkbox"
+                aria-label="Choose ${name}"
+                .checked=${chosen.has(id)}
+                @click=${(event: MouseEvent) => this.toggle(event, id, group)}
+              />`
+            : html`<span></span>`
+        }
+        <button @click=${() => this.frame(id)} aria-label="Show ${name}, length ${short(loop.length)}">
+          ${name}${filled ? ' ✓ mended' : ''}
+        </button>
+        <span class="quiet small">${short(loop.length)} · ${loop.vertices} vertices</span>
+        ${skip ? html`<span class="why quiet small">Left open: ${skip.reason}.</span>` : nothing}
+      </li>
+    `;
+  }
+
+  private toggle(event: MouseEvent, id: number, group: readonly Loop[]): void {
+    const ids = group.map((loop) => loop.id ?? 0);
+    const chosen = new Set(this.editor.chosen);
+    const [from, to] = [ids.indexOf(this.lastClicked ?? id), ids.indexOf(id)];
+    const range = event.shiftKey && from >= 0 ? ids.slice(Math.min(from, to), Math.max(from, to) + 1) : [id];
+    const choose = (event.target as HTMLInputElement).checked;
+    for (const each of range) {
+      if (choose) {
+        chosen.add(each);
+      } else {
+        chosen.delete(each);
+      }
+    }
+    this.lastClicked = id;
+    this.editor.choose(chosen);
+  }
+
+  private frame(id: number): void {
+    this.dispatchEvent(new CustomEvent('darn-frame', { detail: id, bubbles: true, composed: true }));
+  }
+
+  private readonly mend = (): void => void this.editor.mend();
+}
+
+customElements.define('darn-holes', HolesPanel);

@@ -1,0 +1,81 @@
+/** How things are drawn, and the comparison with the scan as it was. */
+import type { Look } from '../scene/viewer.js';
+import { type TemplateResult, css, html } from '../vendor.js';
+import { Panel } from './panel.js';
+
+const SHADINGS = [
+  ['textured', 'Textured'],
+  ['shaded', 'Shaded'],
+  ['wireframe', 'Wireframe'],
+] as const;
+
+/** The event `darn-look` carries what has changed of the look in `detail`. */
+export class LookPanel extends Panel {
+  static override styles = [
+    Panel.styles,
+    css`
+      fieldset {
+        margin: 0 0 0.5rem;
+        padding: 0;
+        border: 0;
+      }
+      label {
+        display: inline-flex;
+        align-items: center;
+        gap: 4px;
+        min-height: 28px;
+      }
+      .compare {
+        display: block;
+      }
+    `,
+  ].flat();
+
+  protected override render(): TemplateResult {
+    return html`
+      <h2>Look</h2>
+      <fieldset>
+        <legend class="quiet small">Surface</legend>
+        <div class="row">
+          ${SHADINGS.map(
+            ([shading, name]) => html`
+              <label>
+                <input
+                  type="radio"
+                  name="shading"
+                  ?checked=${shading === 'textured'}
+                  @change=${() => this.look({ shading })}
+                />${name}
+              </label>
+            `,
+          )}
+        </div>
+      </fieldset>
+      <label>
+        <input
+          type="checkbox"
+          checked
+          @change=${(event: Event) => this.look({ tinted: (event.target as HTMLInputElement).checked })}
+        />
+        New cloth in its own colour
+      </label>
+      <label class="compare">
+        Before and after (hold B for before)
+        <input
+          type="range"
+          min="0"
+          max="1"
+          step="0.01"
+          value="0"
+          @input=${(event: Event) => this.look({ split: Number((event.target as HTMLInputElement).value) })}
+        />
+      </label>
+    `;
+  }
+
+  private look(detail: Partial<Look>): void {
+    this.dispatchEvent(new CustomEvent('darn-look', { detail, bubbles: true, composed: true }));
+  }
+}
+
+customElements.define('darn-look', LookPanel);

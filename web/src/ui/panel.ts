@@ -1,0 +1,22 @@
+/** What the parts of the page have in common: each shows the one editor, and is drawn again when that has changed. */
+import type { Editor } from '../model/editor.js';
+import { LitElement } from '../vendor.js';
+import { shared } from './styles.js';
+
+/** An element that shows the editor's state. Its owner sets `editor` before it is connected. */
+export abstract class Panel extends LitElement {
+  static override styles = [shared];
+
+  editor!: Editor;
+  private readonly changed = (): void => this.requestUpdate();
+
+  override connectedCallback(): void {
+    super.connectedCallback();
+    this.editor.addEventListener('change', this.changed);
+  }
+
+  override disconnectedCallback(): void {
+    super.disconnectedCallback();
+    this.editor.removeEventListener('change', this.changed);
+  }
+}

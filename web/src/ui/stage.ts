@@ -1,0 +1,92 @@
+/** The picture of the scan as an element: it shows the editor's state, and gives pointers and keys to the gestures. */
+import { Viewer } from '../scene/viewer.js';
+import { type TemplateResult, css, html } from '../vendor.js';
+import { Panel } from './panel.js';
+
+export class Stage extends Panel {
+  static override styles = [
+    Panel.styles,
+    css`
+      :host {
+        display: block;
+        position: relative;
+        overflow: hidden;
+        background: radial-gradient(circle at 50% 40%, var(--surface), var(--raised));
+      }
+      #host {
+        position: absolute;
+        inset: 0;
+      }
+      canvas {
+        display: block;
+        touch-action: none;
+      }
+      canvas:focus-visible {
+        outline-offset: -3px;
+      }
+    `,
+  ].flat();
+
+  viewer: Viewer | undefined;
+  private readonly opened = (): void => void this.show();
+
+  override connectedCallback(): void {
+    super.connectedCallback();
+    this.editor.addEventListener('opened', this.opened);
+  }
+
+  override disconnectedCallback(): void {
+    super.disconnectedCallback();
+    this.editor.removeEventListener('opened', this.opened);
+    this.viewer?.dispose();
+    this.viewer = undefined;
+  }
+
+  protected override render(): TemplateResult {
+    return html`<div id="host"></div>`;
+  }
+
+  protected override firstUpdated(): void {
+    const host = this.renderRoot.querySelector<HTMLElement>('#host');
+    if (host === null) {
+      return;
+    }
+    try {
+      this.viewer = new Viewer(host);
+    } catch (error) {
+      this.editor.report(new Error(`This browser draws no 3-D pictures (WebGL 2): ${String(error)}`));
+      return;
+    }
+    const { canvas } = this.viewer;
+    canvas.setAttribute('role', 'img');
+    canvas.setAttribute(
+      'aria-label',
+      'The scan. Drag to turn it, two fingers or the right button to move it, F to see all.',
+    );
+    canvas.addEventListener('dblclick', (event) => {
+      const hit = this.viewer?.pick(event.clientX, event.clientY);
+      if (hit !== undefined) {
+        this.viewer?.pivotAt(hit.position);
+      }
+    });
+  }
+
+  protected override updated(): void {
+    this.viewer?.chooseLoops(this.editor.chosen);
+    void this.viewer?.showPatches(this.editor.patches);
+  }
+
+  private async show(): Promise<void> {
+    const { scan } = this.editor;
+    if (scan !== undefined) {
+      try {
+        await this.viewer?.showScan(scan.bytes, scan.loops);
+        this.requestUpdate();
+      } catch (error) {
+        this.editor.report(new Error(`The scan was read by the service, but cannot be drawn: ${String(error)}`));
+      }
+    }
+  }
+}
+
+customElements.define('darn-stage', Stage);
