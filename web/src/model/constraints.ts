@@ -7,17 +7,7 @@ export interface ClothConstraints {
   readonly edits: readonly Edit[];
 }
 
-/** A gesture or an anchor that is being made. */
-export type Draft = { readonly edit: Edit } | { readonly anchor: Anchor };
-
 export const NO_CONSTRAINTS: ClothConstraints = { anchors: [], edits: [] };
-
-/** The constraints with one more gesture or anchor. */
-export function withDraft(constraints: ClothConstraints, draft: Draft): ClothConstraints {
-  return 'edit' in draft
-    ? { ...constraints, edits: [...constraints.edits, draft.edit] }
-    : { ...constraints, anchors: [...constraints.anchors, draft.anchor] };
-}
 
 /** The constraints that concern some holes; those that name no hole are kept. */
 export function onHoles(constraints: ClothConstraints, holes: ReadonlySet<number>): ClothConstraints {

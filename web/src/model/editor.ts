@@ -1,18 +1,17 @@
 /** What the editor knows and does, without a page: the scan, its holes, the session, every step and what was chosen. */
-import type { Anchor, AnchorFound, HoleReport, Info, Loop, Report, Skipped } from '../contract.js';
+import type { AnchorFound, HoleReport, Info, Loop, Report, Skipped, Uv } from '../contract.js';
 import { describeError, isAbort } from '../service/problem.js';
 import type { Progress } from '../service/requests.js';
 import type { Service } from '../service/service.js';
 import {
   type ClothConstraints,
-  type Draft,
   NO_CONSTRAINTS,
   messageOf,
   onHoles,
   readConstraints,
   statelessMessageOf,
-  withDraft,
 } from './constraints.js';
+import { type AnchorDraft, type Draft, type DraftKind, NAMES, withAnchor, withGesture } from './draft.js';
 import { History } from './history.js';
 import { Latest } from './latest.js';
 import { isHole } from './loops.js';
@@ -30,7 +29,7 @@ export interface Step {
 }
 
 /** What a pointer on the new cloth does. */
-export type Tool = 'look' | 'grab' | 'twist' | 'pinch' | 'anchor';
+export type Tool = 'look' | DraftKind;
 
 /** The scan that is open. */
 export interface OpenScan {
@@ -161,18 +160,20 @@ export class Editor extends EventTarget {
     await this.apply(`Mend ${count}`, holes, onHoles(this.step.constraints, this.chosen));
   }
 
-  /** Shows a gesture while it is made: sends it when the answer to the one before has come. */
+  /** Shows a gesture while it is made: sends it when the answer to the one before has come. An anchor's place is found only at its commit. */
   preview(draft: Draft): void {
     this.draft = draft;
     this.changed();
+    if (draft.kind === 'anchor') {
+      return;
+    }
     this.live.offer(async () => {
       const { step, session } = this;
       if (this.draft !== draft || session === undefined) {
         return;
       }
       try {
-        const constraints = withDraft(step.constraints, draft);
-        const patches = await session.preview(step.holes, messageOf(constraints));
+        const patches = await session.preview(step.holes, messageOf(withGesture(step.constraints, draft)));
         if (this.draft !== undefined && this.step === step) {
           this.draftPatches = patches;
           this.changed();
@@ -184,13 +185,17 @@ export class Editor extends EventTarget {
   }
 
   /** Makes the draft a step. */
-  async commit(label: string): Promise<void> {
+  async commit(): Promise<void> {
     const { draft } = this;
     if (draft === undefined) {
       return;
     }
-    await this.live.settled();
-    await this.apply(label, this.step.holes, withDraft(this.step.constraints, draft));
+    if (draft.kind === 'anchor') {
+      await this.placeAnchor(draft);
+    } else {
+      const constraints = withGesture(this.step.constraints, draft);
+      await this.apply(NAMES[draft.kind], this.step.holes, constraints);
+    }
   }
 
   /** Forgets the draft. */
@@ -205,10 +210,11 @@ export class Editor extends EventTarget {
    *
    * @param map - Whether the loss of every cell is asked for, which takes longer.
    */
-  async findAnchor(hole: number, target: readonly number[], map: boolean): Promise<FoundAnchor | undefined> {
+  async findAnchor({ hole, position }: AnchorDraft, map: boolean): Promise<FoundAnchor | undefined> {
     let result: FoundAnchor | undefined;
-    await this.working('Searching', async (progress) => {
-      const found = await this.session?.optimizeAnchor(this.step.holes, { hole, target: [...target], map }, progress);
+    await this.working(map ? 'Drawing the map' : 'Searching', async (progress) => {
+      const query = { hole, target: [...position], map };
+      const found = await this.session?.optimizeAnchor(this.step.holes, query, progress);
       if (found !== undefined) {
         result = { hole, found };
         this.found = result;
@@ -218,10 +224,13 @@ export class Editor extends EventTarget {
     return result;
   }
 
-  /** Adds an anchor as a step. */
-  async addAnchor(anchor: Anchor): Promise<void> {
-    this.draft = { anchor };
-    await this.commit(anchor.hard ? 'Hard anchor' : 'Anchor');
+  /** Searches the place of an anchor and adds it as a step. */
+  private async placeAnchor(draft: AnchorDraft): Promise<void> {
+    const uv = (await this.findAnchor(draft, false))?.found.uv;
+    if (uv !== undefined) {
+      const constraints = withAnchor(this.step.constraints, draft, uv as Uv);
+      await this.apply(draft.hard ? 'Hard anchor' : NAMES.anchor, this.step.holes, constraints);
+    }
   }
 
   undo(): void {
@@ -270,6 +279,12 @@ export class Editor extends EventTarget {
     return result;
   }
 
+  /** Tells the person something. */
+  say(message: string): void {
+    this.message = message;
+    this.changed();
+  }
+
   /** Shows an error to the person. */
   report(error: unknown): void {
     if (!isAbort(error)) {
@@ -306,6 +321,9 @@ export class Editor extends EventTarget {
 
   private travel(move: () => void, word: string): void {
     const before = this.step;
+    if (this.work !== undefined) {
+      return;
+    }
     move();
     if (this.step !== before) {
       this.message = `${word}. Now: ${this.step.label}.`;
@@ -315,7 +333,7 @@ export class Editor extends EventTarget {
     this.dropDraft();
   }
 
-  /** Runs a task that takes time, one at a time, and shows its progress and its error. */
+  /** Runs a task that takes time, and shows its progress and its error. One at a time: a new one stops the one before. */
   private async working(label: string, task: (progress: Progress) => Promise<void>): Promise<void> {
     this.work?.stop.abort();
     const stop = new AbortController();
@@ -328,6 +346,8 @@ export class Editor extends EventTarget {
     this.problem = undefined;
     show(label, undefined);
     try {
+      // A gesture's last preview must not come after the answer to this.
+      await this.live.settled();
       await task({
         signal: stop.signal,
         onSent: (share) => show(share < 1 ? label : 'Computing', share < 1 ? share : undefined),

@@ -12,8 +12,8 @@ export interface KindStyle {
 
 const STYLES: ReadonlyMap<string, KindStyle> = new Map([
   ['HOLE', { plural: 'Holes', singular: 'Hole', color: '#d9480f', line: 'solid' }],
-  ['TUBE_END', { plural: 'Ends of sleeves', singular: 'End of a sleeve', color: '#2b8a3e', line: 'dotted' }],
-  ['OUTER_BOUNDARY', { plural: 'Borders', singular: 'Border', color: '#1864ab', line: 'dashed' }],
+  ['TUBE_END', { plural: 'Ends of sleeves', singular: 'End of a sleeve', color: '#37a04d', line: 'dotted' }],
+  ['OUTER_BOUNDARY', { plural: 'Borders', singular: 'Border', color: '#3f86c9', line: 'dashed' }],
 ]);
 
 /** Also for kinds that a newer service may name. */

@@ -1,5 +1,6 @@
 /** The new cloth of one hole as three.js shows it: its surface follows the patch's positions, and a hit on it has a uv. */
 import type { Uv } from '../contract.js';
+import { type ClothPoint, locate } from '../model/cloth.js';
 import type { Patch } from '../model/scan_session.js';
 import {
   BufferAttribute,
@@ -13,17 +14,6 @@ import {
   Vector3,
 } from '../vendor.js';
 import { vectors } from './scan_model.js';
-
-/** A place on new cloth. */
-export interface ClothPoint {
-  readonly hole: number;
-  readonly uv: Uv;
-  /** The triangle of the patch, and where in it. */
-  readonly face: number;
-  readonly weights: readonly [number, number, number];
-  readonly position: Vector3;
-  readonly normal: Vector3;
-}
 
 /** The surfaces of a dressing's GLB, in order of hole id. */
 export async function readSurfaces(glb: ArrayBuffer): Promise<BufferGeometry[]> {
@@ -126,59 +116,16 @@ export class PatchModel {
     const uv = [0, 1].map((axis) =>
       vertices.reduce((sum, vertex, i) => sum + (weights[i] as number) * (uvs[2 * vertex + axis] as number), 0),
     ) as Uv;
-    return this.at(uv);
-  }
-
-  /** The place with a uv; undefined outside the patch. */
-  at(uv: Uv): ClothPoint | undefined {
-    const { patchFaces = [], patchUvs = [] } = this.patch.hole;
-    const corner = (vertex: number): Uv => [patchUvs[2 * vertex] as number, patchUvs[2 * vertex + 1] as number];
-    for (let face = 0; face + 2 < patchFaces.length; face += 3) {
-      const vertices = patchFaces.slice(face, face + 3) as [number, number, number];
-      const weights = planarWeights(uv, vertices.map(corner) as [Uv, Uv, Uv]);
-      if (weights !== undefined) {
-        return { hole: this.hole, uv, face: face / 3, weights, ...this.located(vertices, weights) };
-      }
-    }
-    return undefined;
-  }
-
-  /** Where a place is now, after the cloth has moved. */
-  follow(point: ClothPoint): Vector3 {
-    const vertices = (this.patch.hole.patchFaces ?? []).slice(3 * point.face, 3 * point.face + 3);
-    return this.located(vertices as [number, number, number], point.weights).position;
+    return locate(this.patch, uv);
   }
 
   dispose(): void {
     this.mesh.geometry.dispose();
   }
 
-  private located(
-    vertices: readonly [number, number, number],
-    weights: readonly [number, number, number],
-  ): { position: Vector3; normal: Vector3 } {
-    const points = vertices.map((vertex) => this.vertex(vertex)) as [Vector3, Vector3, Vector3];
-    const position = new Vector3();
-    points.forEach((point, i) => position.addScaledVector(point, weights[i] as number));
-    return { position, normal: Triangle.getNormal(...points, new Vector3()) };
-  }
-
   private vertex(vertex: number): Vector3 {
     return new Vector3().fromArray(this.patch.positions, 3 * vertex);
   }
-}
-
-/** Barycentric coordinates of a point in a triangle of the plane; undefined outside it. */
-function planarWeights([u, v]: Uv, [a, b, c]: [Uv, Uv, Uv]): [number, number, number] | undefined {
-  const area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
-  if (area === 0) {
-    return undefined;
-  }
-  const second = ((u - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (v - a[1])) / area;
-  const third = ((b[0] - a[0]) * (v - a[1]) - (u - a[0]) * (b[1] - a[1])) / area;
-  const first = 1 - second - third;
-  const slack = -1e-6;
-  return first >= slack && second >= slack && third >= slack ? [first, second, third] : undefined;
 }
 
 /** For each corner of the surface, the patch vertex at its position: the same numbers, or else the nearest one. */

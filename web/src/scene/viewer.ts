@@ -1,9 +1,11 @@
 /** The picture: a camera around the scan, the scan, its rims and the new cloth; drawn only when something has changed. */
 import type { Loop } from '../contract.js';
+import type { ClothPoint } from '../model/cloth.js';
 import { byKind } from '../model/loops.js';
 import type { Patch } from '../model/scan_session.js';
 import {
   Box3,
+  type BufferGeometry,
   DirectionalLight,
   HemisphereLight,
   type Material,
@@ -19,7 +21,7 @@ import {
 } from '../vendor.js';
 import { linesOfLoops } from './boundary.js';
 import { Marks } from './marks.js';
-import { type ClothPoint, PatchModel, TINT, blendedMaterial, readSurfaces } from './patch_model.js';
+import { PatchModel, TINT, blendedMaterial, readSurfaces } from './patch_model.js';
 import { Rims } from './rims.js';
 import { ScanModel, type Shading, plainMaterial } from './scan_model.js';
 
@@ -55,6 +57,8 @@ export class Viewer {
   private scan: ScanModel | undefined;
   private rims: Rims | undefined;
   private patches: PatchModel[] = [];
+  /** Those that were asked for last; their surfaces may still be read. */
+  private wanted: readonly Patch[] = [];
   private look = FIRST_LOOK;
   /** Around the scan. */
   private sphere: Sphere | undefined;
@@ -112,25 +116,23 @@ export class Viewer {
 
   /** Shows new cloth. Where it is a state of the same patches, only its positions are sent to the graphics card. */
   async showPatches(patches: readonly Patch[]): Promise<void> {
-    const same =
-      patches.length === this.patches.length &&
-      patches.every((patch, i) => this.patches[i]?.shown.dressing === patch.dressing);
-    if (same) {
-      patches.forEach((patch, i) => {
-        if (this.patches[i]?.shown !== patch) {
-          this.patches[i]?.update(patch);
-        }
-      });
-    } else {
-      const dressing = patches[0]?.dressing;
+    this.wanted = patches;
+    const dressing = patches[0]?.dressing;
+    if (!this.showsSurfacesOf(patches)) {
       const surfaces = dressing === undefined ? [] : await readSurfaces(dressing.glb.slice(0));
-      this.clearPatches();
-      this.patches = patches.flatMap((patch, i) => {
-        const surface = surfaces[i];
-        return surface === undefined ? [] : [new PatchModel(patch, surface, this.materialOf(patch))];
-      });
-      this.scene.add(...this.patches.map(({ mesh }) => mesh));
+      // Others may have been asked for, or shown, since.
+      if (this.wanted[0]?.dressing !== dressing) {
+        return;
+      }
+      if (!this.showsSurfacesOf(this.wanted)) {
+        this.replacePatches(surfaces);
+      }
     }
+    this.wanted.forEach((patch, i) => {
+      if (this.patches[i]?.shown !== patch) {
+        this.patches[i]?.update(patch);
+      }
+    });
     this.draw();
   }
 
@@ -194,11 +196,6 @@ export class Viewer {
     const cosine = direction.dot(ray);
     const along = (cosine * ray.dot(between) - direction.dot(between)) / Math.max(1 - cosine * cosine, 1e-6);
     return through.clone().addScaledVector(direction, along);
-  }
-
-  /** The patch of a hole. */
-  patchOf(hole: number): PatchModel | undefined {
-    return this.patches.find((patch) => patch.hole === hole);
   }
 
   /** Draws at the next frame. */
@@ -311,6 +308,23 @@ export class Viewer {
     this.scan = undefined;
     this.rims = undefined;
     this.sphere = undefined;
+  }
+
+  private showsSurfacesOf(patches: readonly Patch[]): boolean {
+    const same = (patch: Patch, i: number): boolean => this.patches[i]?.shown.dressing === patch.dressing;
+    return patches.length === this.patches.length && patches.every(same);
+  }
+
+  private replacePatches(surfaces: readonly BufferGeometry[]): void {
+    this.clearPatches();
+    this.wanted.forEach((patch, i) => {
+      const surface = surfaces[i];
+      if (surface !== undefined) {
+        const model = new PatchModel(patch, surface, this.materialOf(patch));
+        this.patches.push(model);
+        this.scene.add(model.mesh);
+      }
+    });
   }
 
   private clearPatches(): void {

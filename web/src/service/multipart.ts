@@ -22,6 +22,10 @@ export function partsOf(contentType: string, answer: ArrayBuffer): Map<string, P
   for (;;) {
     const headEnd = find(bytes, '\r\n\r\n', at);
     if (headEnd < 0) {
+      const rest = new TextDecoder().decode(bytes.subarray(at));
+      if (!rest.startsWith(`--${boundary}--`)) {
+        throw new Error('a multipart/mixed answer ends before its last line');
+      }
       return parts;
     }
     const head = new TextDecoder().decode(bytes.subarray(at, headEnd)).toLowerCase();

@@ -3,11 +3,14 @@ import { Editor } from '../model/editor.js';
 import { Service } from '../service/service.js';
 import { type TemplateResult, LitElement, css, html, nothing } from '../vendor.js';
 import { download } from './download.js';
+import './chart_panel.js';
+import './constraints_panel.js';
 import './holes_panel.js';
 import './look_panel.js';
 import './report_panel.js';
 import { Stage } from './stage.js';
 import { shared } from './styles.js';
+import { TOOLS } from './tools_panel.js';
 
 /** What the person may drop or pick. */
 const SCAN_FILE = /\.(glb|gltf)$/i;
@@ -187,8 +190,11 @@ export class EditorElement extends LitElement {
             ? html`<p class="quiet">The holes of the scan will be listed here.</p>`
             : html`
                 <darn-holes .editor=${editor}></darn-holes>
+                <darn-tools .editor=${editor}></darn-tools>
+                <darn-chart .editor=${editor}></darn-chart>
                 <darn-look .editor=${editor}></darn-look>
                 <darn-report .editor=${editor}></darn-report>
+                <darn-constraints .editor=${editor}></darn-constraints>
               `
         }
       </aside>
@@ -324,7 +330,10 @@ export class EditorElement extends LitElement {
     if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event)) {
       return;
     }
-    if (key === 'f') {
+    const tool = TOOLS.find((it) => it.key.toLowerCase() === key)?.tool;
+    if (tool !== undefined && (tool === 'look' || this.editor.step.patches.length > 0)) {
+      this.editor.setTool(tool);
+    } else if (key === 'f') {
       this.stage?.viewer?.frame();
     } else if (key === 'b') {
       this.stage?.viewer?.setLook({ before: true });

@@ -1,4 +1,6 @@
 /** The picture of the scan as an element: it shows the editor's state, and gives pointers and keys to the gestures. */
+import { marksOf } from '../scene/draft_marks.js';
+import { Gestures } from '../scene/gestures.js';
 import { Viewer } from '../scene/viewer.js';
 import { type TemplateResult, css, html } from '../vendor.js';
 import { Panel } from './panel.js';
@@ -28,6 +30,7 @@ export class Stage extends Panel {
   ].flat();
 
   viewer: Viewer | undefined;
+  private gestures: Gestures | undefined;
   private readonly opened = (): void => void this.show();
 
   override connectedCallback(): void {
@@ -38,6 +41,7 @@ export class Stage extends Panel {
   override disconnectedCallback(): void {
     super.disconnectedCallback();
     this.editor.removeEventListener('opened', this.opened);
+    this.gestures?.dispose();
     this.viewer?.dispose();
     this.viewer = undefined;
   }
@@ -53,6 +57,7 @@ export class Stage extends Panel {
     }
     try {
       this.viewer = new Viewer(host);
+      this.gestures = new Gestures(this.viewer, this.editor);
     } catch (error) {
       this.editor.report(new Error(`This browser draws no 3-D pictures (WebGL 2): ${String(error)}`));
       return;
@@ -74,6 +79,7 @@ export class Stage extends Panel {
   protected override updated(): void {
     this.viewer?.chooseLoops(this.editor.chosen);
     void this.viewer?.showPatches(this.editor.patches);
+    this.viewer?.marks.show(marksOf(this.editor, this.gestures?.waitingPoint));
   }
 
   private async show(): Promise<void> {

@@ -1,0 +1,232 @@
+/** From a pointer on the picture to a gesture on the cloth. */
+import type { Uv, Vec3 } from '../contract.js';
+import { type ClothPoint, nearestPatch, normalOf, positionOf } from '../model/cloth.js';
+import type { Draft } from '../model/draft.js';
+import type { Editor } from '../model/editor.js';
+import { Vector3 } from '../vendor.js';
+import type { Hit, Viewer } from './viewer.js';
+
+/** A pointer that moved less, in CSS pixels, has clicked. */
+const CLICK = 4;
+/** Radians that a twist turns for each CSS pixel. */
+const TURN = Math.PI / 200;
+/** How much a notch of the wheel changes a twist's radius, and its bounds on the chart. */
+const RADIUS = { step: 1.1, least: 0.02, most: 0.5 };
+
+const AXES: ReadonlyMap<string, Vector3> = new Map([
+  ['x', new Vector3(1, 0, 0)],
+  ['y', new Vector3(0, 1, 0)],
+  ['z', new Vector3(0, 0, 1)],
+]);
+
+/** A pointer that is down. */
+interface Hold {
+  readonly pointer: number;
+  readonly x: number;
+  readonly y: number;
+  readonly hit: Hit;
+  /** The cloth under it, where the tool needs cloth. */
+  readonly cloth: HeldCloth | undefined;
+  moved: boolean;
+}
+
+/** A place on cloth, and where it was when it was taken. */
+interface HeldCloth {
+  readonly point: ClothPoint;
+  readonly position: Vector3;
+  readonly normal: Vector3;
+}
+
+/**
+ * Listens to the canvas before the camera's controls do. A pointer that goes down on new cloth with a tool chosen makes a gesture; any
+ * other pointer moves the camera.
+ */
+export class Gestures {
+  private hold: Hold | undefined;
+  private firstOfPinch: ClothPoint | undefined;
+  private heldAxis: string | undefined;
+  private radius = 0.125;
+  private readonly listening = new AbortController();
+
+  constructor(
+    private readonly viewer: Viewer,
+    private readonly editor: Editor,
+  ) {
+    const { signal } = this.listening;
+    const first = { capture: true, signal };
+    const { canvas } = viewer;
+    canvas.addEventListener('pointerdown', (event) => this.down(event), first);
+    canvas.addEventListener('pointermove', (event) => this.move(event), first);
+    canvas.addEventListener('pointerup', (event) => this.up(event), first);
+    canvas.addEventListener('pointercancel', () => this.cancel(), first);
+    canvas.addEventListener('wheel', (event) => this.wheel(event), { ...first, passive: false });
+    addEventListener('keydown', (event) => this.key(event, true), { signal });
+    addEventListener('keyup', (event) => this.key(event, false), { signal });
+  }
+
+  /** The first point of a pinch that waits for its second. */
+  get waitingPoint(): ClothPoint | undefined {
+    return this.editor.tool === 'pinch' ? this.firstOfPinch : undefined;
+  }
+
+  /** Forgets the gesture that is being made. */
+  cancel(): void {
+    this.hold = undefined;
+    this.firstOfPinch = undefined;
+    this.editor.dropDraft();
+  }
+
+  dispose(): void {
+    this.listening.abort();
+  }
+
+  private down(event: PointerEvent): void {
+    const { tool, work } = this.editor;
+    if (this.hold !== undefined) {
+      event.stopImmediatePropagation();
+      return;
+    }
+    if (tool === 'look' || work !== undefined || event.button !== 0 || !event.isPrimary) {
+      return;
+    }
+    const hit = this.viewer.pick(event.clientX, event.clientY);
+    const cloth = this.held(hit?.cloth);
+    if (hit === undefined || (cloth === undefined && (tool !== 'anchor' || this.editor.step.patches.length === 0))) {
+      return;
+    }
+    event.stopImmediatePropagation();
+    this.viewer.canvas.focus();
+    this.viewer.canvas.setPointerCapture(event.pointerId);
+    this.hold = { pointer: event.pointerId, x: event.clientX, y: event.clientY, hit, cloth, moved: false };
+  }
+
+  private move(event: PointerEvent): void {
+    const { hold } = this;
+    if (hold === undefined || event.pointerId !== hold.pointer) {
+      return;
+    }
+    event.stopImmediatePropagation();
+    hold.moved ||= Math.hypot(event.clientX - hold.x, event.clientY - hold.y) > CLICK;
+    const draft = hold.moved ? this.dragged(hold, event) : undefined;
+    if (draft !== undefined) {
+      this.editor.preview(draft);
+    }
+  }
+
+  private up(event: PointerEvent): void {
+    const { hold } = this;
+    if (hold === undefined || event.pointerId !== hold.pointer) {
+      return;
+    }
+    event.stopImmediatePropagation();
+    this.hold = undefined;
+    const { tool } = this.editor;
+    if (tool === 'pinch') {
+      this.pinched(hold);
+    } else if (tool === 'anchor' && !hold.moved) {
+      this.editor.preview(this.anchorAt(hold, hold.hit.position));
+      void this.editor.commit();
+    } else if (hold.moved && this.editor.draft !== undefined) {
+      void this.editor.commit();
+    }
+  }
+
+  /** The gesture of a pointer that was dragged to where it is now. */
+  private dragged(hold: Hold, event: PointerEvent): Draft | undefined {
+    const { cloth } = hold;
+    switch (this.editor.tool) {
+      case 'grab':
+        return cloth && this.grabbed(cloth, event);
+      case 'twist':
+        return cloth && this.twisted(cloth, event.clientX - hold.x);
+      case 'anchor': {
+        const target = this.viewer.onScreenPlane(event.clientX, event.clientY, hold.hit.position);
+        return target && this.anchorAt(hold, target);
+      }
+      default:
+        return undefined;
+    }
+  }
+
+  private grabbed({ point, position, normal }: HeldCloth, event: PointerEvent): Draft | undefined {
+    const { clientX, clientY } = event;
+    const axis = event.shiftKey ? normal : AXES.get(this.heldAxis ?? '');
+    const target = axis
+      ? this.viewer.onLine(clientX, clientY, position, axis)
+      : this.viewer.onScreenPlane(clientX, clientY, position);
+    const { hole, uv } = point;
+    return target && { kind: 'grab', hole, uv, offset: target.sub(position).toArray() };
+  }
+
+  private twisted({ point, normal }: HeldCloth, pixels: number): Draft {
+    // To the right turns clockwise for who looks at it, whichever side of the cloth that is.
+    const axis = normal.clone();
+    if (axis.dot(this.viewer.camera.getWorldDirection(new Vector3())) > 0) {
+      axis.negate();
+    }
+    const { hole, uv } = point;
+    return { kind: 'twist', hole, uv, radius: this.radius, axis: axis.toArray(), angle: -pixels * TURN };
+  }
+
+  private anchorAt({ cloth }: Hold, target: Vector3): Draft {
+    const position: Vec3 = target.toArray();
+    const nearest = nearestPatch(this.editor.step.patches, position)?.hole.id ?? 0;
+    const { draft } = this.editor;
+    const hard = draft?.kind === 'anchor' && draft.hard;
+    return { kind: 'anchor', hole: cloth?.point.hole ?? nearest, position, hard };
+  }
+
+  /** A click of the pinch: the first point, or the second, after which its amount can be chosen. */
+  private pinched({ cloth }: Hold): void {
+    const first = this.firstOfPinch;
+    if (cloth === undefined) {
+      return;
+    }
+    if (first === undefined || first.hole !== cloth.point.hole) {
+      this.firstOfPinch = cloth.point;
+      this.editor.say('Pinch: click the second point.');
+      return;
+    }
+    this.firstOfPinch = undefined;
+    const uvs: [Uv, Uv] = [first.uv, cloth.point.uv];
+    this.editor.say('Pinch: choose how much, then apply.');
+    this.editor.preview({ kind: 'pinch', hole: first.hole, uvs, amount: 0.5 });
+  }
+
+  private wheel(event: WheelEvent): void {
+    if (this.editor.tool !== 'twist' || this.viewer.pick(event.clientX, event.clientY)?.cloth === undefined) {
+      return;
+    }
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    const radius = this.radius * RADIUS.step ** -Math.sign(event.deltaY);
+    this.radius = Math.min(Math.max(radius, RADIUS.least), RADIUS.most);
+    const { draft } = this.editor;
+    if (draft?.kind === 'twist') {
+      this.editor.preview({ ...draft, radius: this.radius });
+    } else {
+      this.editor.say(`Twist: radius ${this.radius.toFixed(3)} of the chart.`);
+    }
+  }
+
+  private key(event: KeyboardEvent, down: boolean): void {
+    const key = event.key.toLowerCase();
+    if (down && key === 'escape') {
+      this.cancel();
+    } else if (AXES.has(key) && (down ? this.hold !== undefined : key === this.heldAxis)) {
+      this.heldAxis = down ? key : undefined;
+    }
+  }
+
+  private held(point: ClothPoint | undefined): HeldCloth | undefined {
+    const patch = this.editor.step.patches.find(({ hole }) => hole.id === point?.hole);
+    return (
+      point &&
+      patch && {
+        point,
+        position: new Vector3(...positionOf(patch, point)),
+        normal: new Vector3(...normalOf(patch, point)),
+      }
+    );
+  }
+}

@@ -1,0 +1,317 @@
+// The editor in a real browser, with a real darn.
+
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+import axe from 'axe-core';
+import { PATIENCE, openEditor, repository, startBrowser, startService } from './browser.mjs';
+
+let browser;
+let service;
+
+before(async () => {
+  [browser, service] = await Promise.all([startBrowser(), startService()]);
+});
+
+after(async () => {
+  await browser?.close();
+  service?.stop();
+});
+
+/** A test with a page of its own. */
+function inEditor(name, body, options) {
+  test(name, { timeout: 3 * PATIENCE }, async () => {
+    const editor = await openEditor(browser, service, options);
+    await body(editor, editor.page);
+    await editor.close();
+  });
+}
+
+const EXAMPLE = readFileSync(join(repository, 'examples/scarf_hole.glb'));
+
+/** What one `POST /inpaint` of the same constraints answers. */
+async function stateless(constraints) {
+  const form = new FormData();
+  form.append('scan', new Blob([EXAMPLE], { type: 'model/gltf-binary' }));
+  form.append('constraints', new Blob([constraints], { type: 'application/json' }));
+  const answer = await fetch(new URL('inpaint', service.url), { method: 'POST', body: form });
+  assert.equal(answer.status, 200);
+  return Buffer.from(await answer.arrayBuffer());
+}
+
+/** The file that "Save the scan" gives. */
+async function saved(editor, page) {
+  const [download] = await Promise.all([page.waitForEvent('download'), editor.button('Save the scan').click()]);
+  return { name: download.suggestedFilename(), bytes: readFileSync(await download.path()) };
+}
+
+/** Drops a file on the page. */
+async function drop(page, name, bytes) {
+  const transfer = await page.evaluateHandle(
+    ([fileName, base64]) => {
+      const transfer = new DataTransfer();
+      const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+      transfer.items.add(new File([bytes], fileName));
+      return transfer;
+    },
+    [name, bytes.toString('base64')],
+  );
+  await page.dispatchEvent('darn-editor', 'drop', { dataTransfer: transfer });
+}
+
+inEditor('the example is opened, mended, grabbed, undone, redone and saved', async (editor, page) => {
+  await editor.openExample();
+  await editor.keep('open');
+  const renderer = await page.evaluate(() => {
+    const stage = document.querySelector('darn-editor').shadowRoot.querySelector('darn-stage');
+    return stage.viewer.rendererName;
+  });
+  assert.match(renderer, /\S/);
+  console.log(`# drawn by ${renderer}`);
+  const open = await editor.picture();
+  await editor.mend();
+  await editor.keep('mended');
+  const mended = await editor.picture();
+  assert.ok((await editor.difference(open, mended)) > 0.01, 'new cloth is seen');
+
+  await editor.tool('g');
+  await editor.drag(await editor.onCloth(), { x: 40, y: -40 });
+  const grabbed = await editor.picture();
+  assert.ok((await editor.difference(mended, grabbed)) > 0.002, 'the cloth follows');
+  const constraints = await editor.model((it) => it.constraintsText());
+  const [edit] = JSON.parse(constraints).edits;
+  assert.ok(edit.grab.uv.every((value) => value > 0.2 && value < 0.8));
+  const file = await saved(editor, page);
+  assert.equal(file.name, 'scarf_hole.mended.glb');
+  assert.ok(file.bytes.equals(await stateless(constraints)), 'the bytes are those of POST /inpaint');
+
+  await editor.button('Undo').click();
+  await editor.idle();
+  assert.ok((await editor.difference(mended, await editor.picture())) < 0.0005, 'undo shows what was before');
+  const undone = await saved(editor, page);
+  assert.ok(undone.bytes.equals(await stateless('{"holes": [{"id": 1}]}')), 'undo is saved, too');
+  await page.keyboard.press('Control+Shift+Z');
+  await editor.idle();
+  assert.equal(await editor.model((it) => it.constraintsText()), constraints);
+});
+
+inEditor('while dragging, one request is in flight', async (editor, page) => {
+  await editor.openExample();
+  await editor.mend();
+  let [inFlight, most, sent] = [0, 0, 0];
+  await page.route('**/inpaint', async (route) => {
+    inFlight += 1;
+    sent += 1;
+    most = Math.max(most, inFlight);
+    await new Promise((resolve) => setTimeout(resolve, 50));
+    inFlight -= 1;
+    await route.continue();
+  });
+  await editor.tool('g');
+  await editor.drag(await editor.onCloth(), { x: 60, y: 0 }, 30);
+  assert.equal(most, 1);
+  assert.ok(sent > 1 && sent <= 31, `${sent} requests`);
+  await page.unrouteAll({ behavior: 'wait' });
+});
+
+inEditor('twist, pinch and anchor are steps, and undo goes back to the start', async (editor, page) => {
+  await editor.openExample();
+  await editor.mend();
+  await editor.tool('t');
+  const middle = await editor.onCloth();
+  await page.mouse.move(middle.x, middle.y);
+  await page.mouse.wheel(0, -100);
+  await editor.drag(middle, { x: 60, y: 0 });
+  await editor.keep('twist');
+
+  await editor.tool('p');
+  for (const point of [await editor.onCloth(-0.02, -0.01), await editor.onCloth(0.02, 0.03)]) {
+    await page.mouse.click(point.x, point.y);
+  }
+  await page.getByRole('slider', { name: /Share of their distance/ }).fill('0.7');
+  await editor.button('Apply').click();
+  await editor.idle();
+
+  await editor.tool('a');
+  await editor.drag(middle, { x: 20, y: -15 });
+  await page.getByText(/The point belongs at u/).waitFor();
+  await editor.keep('anchor');
+
+  const { edits, anchors } = JSON.parse(await editor.model((it) => it.constraintsText()));
+  assert.ok(edits[0].twist.radius > 0.13 && Math.abs(edits[0].twist.angle + 0.942) < 0.01);
+  assert.equal(edits[1].pinch.amount, 0.7);
+  assert.equal(anchors.length, 1);
+  assert.equal(anchors[0].uv.length, 2);
+  for (let step = 0; step < 4; step += 1) {
+    await editor.button('Undo').click();
+  }
+  assert.equal(await editor.model((it) => it.step.label), 'Open');
+  assert.equal(await editor.button('Undo').isDisabled(), true);
+});
+
+inEditor('everything can be done by keyboard', async (editor, page) => {
+  const press = async (role, name, key = 'Enter') => {
+    await page.getByRole(role, { name, exact: true }).focus();
+    await page.keyboard.press(key);
+    await editor.idle();
+  };
+  await press('button', 'Try the example');
+  await page.getByText('Holes (1)').waitFor();
+  await press('checkbox', 'Choose Hole 1', 'Space');
+  assert.equal(await editor.button('Mend 0 holes').isDisabled(), true);
+  await press('checkbox', 'Choose Hole 1', 'Space');
+  await press('button', 'Mend 1 hole');
+  await press('button', 'Grab');
+  await page.getByLabel('Move y').fill('0.03');
+  await page.keyboard.press('Enter');
+  await editor.idle();
+  const { edits } = JSON.parse(await editor.model((it) => it.constraintsText()));
+  assert.deepEqual(edits[0].grab.offset, [0, 0.03, 0]);
+  assert.match(await page.getByRole('status').textContent(), /Grab: 1 filled/);
+  await press('button', 'Anchor');
+  await page.getByLabel('Point y').fill('5');
+  await page.getByLabel(/Hard/).focus();
+  await page.keyboard.press('Space');
+  await press('button', 'Find its place');
+  await page.getByRole('alert').waitFor();
+  assert.match(await page.getByRole('alert').textContent(), /reach/);
+});
+
+inEditor('a session that has ended is opened again, and the edits are there', async (editor, page) => {
+  await editor.openExample();
+  const opened = page.waitForResponse((answer) => answer.url().endsWith('/sessions') && answer.status() === 201);
+  await editor.mend();
+  const path = (await opened).headers().location;
+  await editor.tool('g');
+  await editor.drag(await editor.onCloth(), { x: 30, y: -20 });
+  assert.equal((await fetch(new URL(path, service.url), { method: 'DELETE' })).status, 204);
+  await editor.drag(await editor.onCloth(0.01, 0.02), { x: -20, y: 10 });
+  const constraints = await editor.model((it) => it.constraintsText());
+  assert.equal(JSON.parse(constraints).edits.length, 2);
+  assert.ok((await saved(editor, page)).bytes.equals(await stateless(constraints)));
+});
+
+inEditor('a busy service is waited for as long as it says', async (editor, page) => {
+  await editor.openExample();
+  let refusals = 0;
+  await page.route('**/sessions', (route) => {
+    refusals += 1;
+    if (refusals > 1) {
+      return route.continue();
+    }
+    const problem = { status: 503, code: 'queue_full', detail: 'full' };
+    return route.fulfill({ status: 503, headers: { 'retry-after': '1' }, json: problem });
+  });
+  await editor.button('Mend 1 hole').click();
+  await page.locator('.notice').getByText('The service is busy; waiting 1 s').waitFor();
+  await page.getByText('✓ mended').waitFor();
+  assert.equal(refusals, 2);
+});
+
+inEditor('an error says what is wrong, and the next drop clears it', async (editor, page) => {
+  await drop(page, 'broken.glb', Buffer.from('not a scan'));
+  await page.getByRole('alert').waitFor();
+  assert.match(await page.getByRole('alert').textContent(), /glTF/i);
+  await drop(page, 'scarf.glb', EXAMPLE);
+  await page.getByText('Holes (1)').waitFor();
+  assert.equal(await page.getByRole('alert').count(), 0);
+  assert.equal(await editor.model((it) => it.scan.name), 'scarf.glb');
+});
+
+inEditor('a scan that is too large is not sent', async (editor, page) => {
+  let sent = 0;
+  page.on('request', (request) => (sent += request.method() === 'POST' ? 1 : 0));
+  await page.evaluate(() => {
+    const file = new Blob(['x']);
+    Object.defineProperty(file, 'size', { value: 1e12 });
+    return document.querySelector('darn-editor').editor.open(file, 'huge.glb');
+  });
+  assert.match(await page.getByRole('alert').textContent(), /at most 134217728/);
+  assert.equal(sent, 0);
+});
+
+inEditor('B and the slider show the scan as it was', async (editor, page) => {
+  await editor.openExample();
+  const open = await editor.picture();
+  await editor.mend();
+  const mended = await editor.picture();
+  await page.locator('darn-stage canvas').focus();
+  const before = await editor.picture();
+  await page.keyboard.down('b');
+  await editor.idle();
+  const held = await editor.picture();
+  assert.ok((await editor.difference(before, held)) > 0.01);
+  await page.keyboard.up('b');
+  await page.getByRole('slider', { name: /Before and after/ }).fill('1');
+  await editor.idle();
+  assert.ok((await editor.difference(open, await editor.picture())) < 0.002);
+  await page.getByRole('slider', { name: /Before and after/ }).fill('0');
+  await editor.idle();
+  assert.ok((await editor.difference(mended, await editor.picture())) < 0.002);
+});
+
+inEditor('the address of a scan in #scan= is opened', async (editor, page) => {
+  await page.goto(`${service.url}#scan=${encodeURIComponent(`${service.url}editor/scarf_hole.glb`)}`);
+  await page.getByText('Holes (1)').waitFor();
+});
+
+inEditor('a lost WebGL context comes back', async (editor, page) => {
+  await editor.openExample();
+  const shown = await editor.picture();
+  await page.evaluate(async () => {
+    const canvas = document
+      .querySelector('darn-editor')
+      .shadowRoot.querySelector('darn-stage')
+      .shadowRoot.querySelector('canvas');
+    const lose = canvas.getContext('webgl2').getExtension('WEBGL_lose_context');
+    const restored = new Promise((done) => canvas.addEventListener('webglcontextrestored', done));
+    lose.loseContext();
+    await new Promise((done) => setTimeout(done, 200));
+    lose.restoreContext();
+    await restored;
+  });
+  await editor.idle();
+  assert.ok((await editor.difference(shown, await editor.picture())) < 0.002);
+});
+
+for (const colorScheme of ['light', 'dark']) {
+  inEditor(
+    `axe finds nothing, ${colorScheme}`,
+    async (editor, page) => {
+      await editor.openExample();
+      await editor.mend();
+      await editor.tool('g');
+      await editor.keep(`axe-${colorScheme}`);
+      // Evaluated by the debugger, which the content security policy does not concern.
+      await page.evaluate(axe.source);
+      const { violations } = await page.evaluate('axe.run()');
+      const found = violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join(' ')}`);
+      assert.deepEqual(found, []);
+    },
+    { colorScheme },
+  );
+}
+
+inEditor(
+  'on a narrow touch screen, one finger on cloth is the tool',
+  async (editor, page) => {
+    await editor.openExample();
+    await editor.mend();
+    const width = await page.evaluate(() => document.documentElement.scrollWidth);
+    assert.ok(width <= 400, `${width} px wide`);
+    await page.getByRole('button', { name: 'Grab', exact: true }).tap();
+    const { x, y } = await editor.onCloth();
+    const session = await editor.context.newCDPSession(page);
+    const touch = (type, points) => session.send('Input.dispatchTouchEvent', { type, touchPoints: points });
+    await touch('touchStart', [{ x, y }]);
+    for (let step = 1; step <= 5; step += 1) {
+      await touch('touchMove', [{ x: x + 4 * step, y: y - 3 * step }]);
+    }
+    await touch('touchEnd', []);
+    await editor.idle();
+    assert.equal(JSON.parse(await editor.model((it) => it.constraintsText())).edits.length, 1);
+    await editor.keep('narrow');
+  },
+  { viewport: { width: 400, height: 800 }, hasTouch: true, isMobile: true },
+);

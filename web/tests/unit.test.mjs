@@ -1,0 +1,171 @@
+// Laws of the modules that need no browser.
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { load } from './sources.mjs';
+
+const { Latest } = await load('model/latest.ts');
+const { History } = await load('model/history.ts');
+const { boundaryLines, linesOfLoops } = await load('scene/boundary.ts');
+const { partsOf } = await load('service/multipart.ts');
+const { readConstraints, onHoles, statelessMessageOf } = await load('model/constraints.ts');
+const { locate, positionOf, normalOf } = await load('model/cloth.ts');
+const { problemOf } = await load('service/problem.ts');
+
+/** A promise and what settles it. */
+function deferred() {
+  let resolve;
+  const promise = new Promise((it) => (resolve = it));
+  return { promise, resolve };
+}
+
+test('one task runs, and of those that come meanwhile the newest alone', async () => {
+  const latest = new Latest();
+  const ran = [];
+  const first = deferred();
+  latest.offer(async () => {
+    ran.push(0);
+    await first.promise;
+  });
+  for (const number of [1, 2, 3]) {
+    latest.offer(async () => ran.push(number));
+  }
+  assert.deepEqual(ran, [0]);
+  first.resolve();
+  await new Promise((resolve) => setTimeout(resolve, 5));
+  assert.deepEqual(ran, [0, 3]);
+});
+
+test('after `settled` nothing that waited runs', async () => {
+  const latest = new Latest();
+  const ran = [];
+  const first = deferred();
+  latest.offer(() => first.promise);
+  latest.offer(async () => ran.push('waited'));
+  const settled = latest.settled();
+  first.resolve();
+  await settled;
+  assert.deepEqual(ran, []);
+  latest.offer(async () => ran.push('next'));
+  assert.deepEqual(ran, ['next']);
+});
+
+test('undo and redo go through all states, and a new one forgets those undone', () => {
+  const history = new History('a');
+  history.push('b');
+  history.push('c');
+  history.undo();
+  history.undo();
+  history.undo();
+  assert.equal(history.present, 'a');
+  assert.equal(history.next, 'b');
+  history.redo();
+  assert.equal(history.present, 'b');
+  history.push('d');
+  assert.equal(history.canRedo, false);
+  history.undo();
+  assert.equal(history.present, 'b');
+});
+
+/** A flat sheet of squares, without those in `missing`; every triangle with vertices of its own, as at texture seams. */
+function sheet(side, missing) {
+  const positions = [];
+  for (let y = 0; y < side; y += 1) {
+    for (let x = 0; x < side; x += 1) {
+      if (!missing.some(([i, j]) => i === x && j === y)) {
+        positions.push(x, y, 0, x + 1, y, 0, x + 1, y + 1, 0);
+        positions.push(x, y, 0, x + 1, y + 1, 0, x, y + 1, 0);
+      }
+    }
+  }
+  const triangles = Uint32Array.from({ length: positions.length / 3 }, (_, i) => i);
+  return { positions: new Float32Array(positions), triangles };
+}
+
+test('boundary loops are found across seams, with length and centroid', () => {
+  const { positions, triangles } = sheet(7, [
+    [2, 2],
+    [5, 4],
+  ]);
+  const lines = boundaryLines(positions, triangles);
+  assert.deepEqual(
+    lines.map((line) => line.length).sort((a, b) => a - b),
+    [4, 4, 28],
+  );
+  const loops = [
+    { id: 7, length: 4, centroid: [5.5, 4.5, 0] },
+    { id: 8, length: 28, centroid: [3.5, 3.5, 0] },
+    { id: 9, length: 4, centroid: [2.5, 2.5, 0] },
+    { id: 10, length: 4, centroid: [30, 0, 0] },
+  ];
+  const found = linesOfLoops(loops, lines);
+  assert.deepEqual([...found.keys()].sort(), [7, 8, 9]);
+  assert.deepEqual(found.get(7).centroid, [5.5, 4.5, 0]);
+});
+
+test('closed surfaces and triangles without area have no boundary loop', () => {
+  const positions = new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]);
+  const closed = new Uint32Array([0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3, 0, 0, 1]);
+  assert.deepEqual(boundaryLines(positions, closed), []);
+});
+
+test('parts of an answer are cut by their length, whatever their bytes', () => {
+  const report = '{"a":1}';
+  const patches = Buffer.from('--x\r\n\r\n--x--');
+  const text = (name, type, length) =>
+    `--x\r\ncontent-disposition: attachment; name="${name}"\r\ncontent-type: ${type}\r\ncontent-length: ${length}\r\n\r\n`;
+  const body = Buffer.concat([
+    Buffer.from(text('report', 'application/json', report.length) + report + '\r\n'),
+    Buffer.from(text('patches', 'application/octet-stream', patches.length)),
+    patches,
+    Buffer.from('\r\n--x--\r\n'),
+  ]);
+  const bytes = body.buffer.slice(body.byteOffset, body.byteOffset + body.length);
+  const parts = partsOf('multipart/mixed; boundary=x', bytes);
+  assert.equal(Buffer.from(parts.get('report').body).toString(), report);
+  assert.deepEqual(Buffer.from(parts.get('patches').body), patches);
+  assert.throws(() => partsOf('model/gltf-binary', bytes));
+  assert.throws(() => partsOf('multipart/mixed; boundary=x', bytes.slice(0, 150)));
+});
+
+test('constraints come back as they were written, and others are refused with what is wrong', () => {
+  const constraints = {
+    anchors: [{ hole: 1, position: [0, 0, 0] }],
+    edits: [{ hole: 2, grab: { uv: [0.5, 0.5], offset: [0, 1, 0] } }],
+  };
+  const text = JSON.stringify(statelessMessageOf([1, 2], constraints));
+  assert.deepEqual(readConstraints(text), { holes: [1, 2], constraints });
+  assert.deepEqual(onHoles(constraints, new Set([2])), { anchors: [], edits: constraints.edits });
+  for (const bad of ['', '[]', '{"cut": 1}', '{"holes": [{"near": [0, 0, 0]}]}', '{"edits": [1]}']) {
+    assert.throws(() => readConstraints(bad), bad);
+  }
+});
+
+test('a place on cloth keeps its uv and follows the positions', () => {
+  const hole = { id: 3, patchFaces: [0, 1, 2, 2, 1, 3], patchUvs: [0, 0, 1, 0, 0, 1, 1, 1] };
+  const flat = { hole, positions: new Float32Array([0, 0, 0, 2, 0, 0, 0, 2, 0, 2, 2, 0]) };
+  const lifted = { hole, positions: flat.positions.map((value, i) => (i % 3 === 2 ? 5 : value)) };
+  for (const uv of [
+    [0.25, 0.25],
+    [0.75, 0.5],
+    [0.5, 0.5],
+    [1, 1],
+  ]) {
+    const point = locate(flat, uv);
+    assert.equal(point.hole, 3);
+    const [x, y, z] = positionOf(flat, point);
+    assert.ok(Math.hypot(x - 2 * uv[0], y - 2 * uv[1], z) < 1e-6, String(uv));
+    assert.equal(positionOf(lifted, point)[2].toFixed(6), '5.000000');
+    assert.equal(normalOf(flat, point)[2], 1);
+  }
+  assert.equal(locate(flat, [1.2, 0]), undefined);
+});
+
+test('a problem document is read, and an answer of a proxy is named by its status', () => {
+  const problem = problemOf(503, '7', JSON.stringify({ code: 'queue_full', detail: '3 jobs wait' }));
+  assert.deepEqual([problem.code, problem.message, problem.retryAfter], ['queue_full', '3 jobs wait', 7]);
+  assert.equal(problemOf(410, null, JSON.stringify({ code: 'session_expired', detail: 'gone' })).sessionIsGone, true);
+  const other = problemOf(502, null, '<html>');
+  assert.match(other.message, /502/);
+  assert.equal(other.retryAfter, undefined);
+});
