@@ -5,6 +5,7 @@ import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import axe from 'axe-core';
+import { sheetWithThreeHoles } from './fixtures.mjs';
 import { PATIENCE, openEditor, repository, startBrowser, startService } from './browser.mjs';
 
 let browser;
@@ -208,6 +209,59 @@ inEditor('a busy service is waited for as long as it says', async (editor, page)
   await page.getByText('✓ mended').waitFor();
   assert.equal(refusals, 2);
 });
+
+inEditor('the chosen holes are filled, one after another, with the edits kept', async (editor, page) => {
+  await drop(page, 'sheet.glb', sheetWithThreeHoles());
+  await page.getByText('Holes (3)').waitFor();
+  await editor.idle();
+  await editor.button('None').click();
+  const boxes = page.getByRole('checkbox', { name: /Choose Hole/ });
+  await boxes.nth(0).check();
+  await editor.button('Mend 1 hole').click();
+  await page.getByText('✓ mended').waitFor();
+  await editor.idle();
+  await editor.button('Grab').click();
+  await page.getByLabel('Move y').fill('0.02');
+  await page.keyboard.press('Enter');
+  await editor.idle();
+  await boxes.nth(2).click({ modifiers: ['Shift'] });
+  await editor.button('Mend 3 holes').click();
+  await editor.idle();
+  assert.equal(await page.getByText('✓ mended').count(), 3);
+  const { holes, edits } = JSON.parse(await editor.model((it) => it.constraintsText()));
+  assert.equal(holes.length, 3);
+  assert.equal(edits.length, 1);
+  await editor.button('Undo').click();
+  await editor.idle();
+  assert.equal(await page.getByText('✓ mended').count(), 1);
+});
+
+inEditor(
+  'a hole that cannot be filled is left open, with the reason, and the others are filled',
+  async (editor, page) => {
+    await drop(page, 'sheet.glb', sheetWithThreeHoles());
+    await page.getByText('Holes (3)').waitFor();
+    await editor.idle();
+    const ids = await editor.model((it) => [...it.chosen]);
+    const reason = 'its rim crosses itself';
+    await page.route('**/sessions', async (route) => {
+      const body = route.request().postData() ?? '';
+      if (body.includes(`{"id":${ids[1]}}`)) {
+        return route.fulfill({ status: 422, json: { status: 422, code: 'rim_crosses_itself', detail: reason } });
+      }
+      const answer = await route.fetch();
+      const session = await answer.json();
+      const skipped = { id: ids[1], kind: 'HOLE', code: 'rim_crosses_itself', reason };
+      const chosenAll = !body.includes('{"id":');
+      return route.fulfill({ response: answer, json: chosenAll ? { ...session, skipped: [skipped] } : session });
+    });
+    await editor.button('Mend 3 holes').click();
+    await editor.idle();
+    assert.equal(await page.getByRole('alert').count(), 0);
+    assert.equal(await page.getByText('✓ mended').count(), 2);
+    await page.getByText(`Left open: ${reason}.`).waitFor();
+  },
+);
 
 inEditor('an error says what is wrong, and the next drop clears it', async (editor, page) => {
   await drop(page, 'broken.glb', Buffer.from('not a scan'));

@@ -45,8 +45,11 @@ function shareInWords(share: number | undefined): string {
   if (share === undefined) {
     return '';
   }
-  return share >= 0.995
-    ? 'The network predicts its folds.'
+  if (share >= 0.995) {
+    return 'The network predicts its folds.';
+  }
+  return share <= 0.005
+    ? 'A fair surface without folds, as the cloth around it has none.'
     : `${percent(share)} of the network's folds, for the rest a fair surface.`;
 }
 

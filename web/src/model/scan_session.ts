@@ -24,8 +24,9 @@ export interface Patch {
 /** A session and the holes that it was opened on. */
 interface Opened {
   readonly id: string;
-  /** The holes that were asked for. */
+  /** The holes that were asked for, and those of them that it fills, as texts to compare. */
   readonly asked: string;
+  readonly filled: string;
   readonly session: Session;
   readonly dressing: Dressing;
   /** The constraints that it met last, as JSON. */
@@ -38,15 +39,19 @@ interface Opened {
  */
 export class ScanSession {
   private opened: Opened | undefined;
+  /** Holes that cannot be filled, by id. */
+  private readonly unfillable = new Map<number, Skipped>();
 
   constructor(
     private readonly service: Service,
     private readonly scan: Blob,
   ) {}
 
-  /** The loops that the session leaves as they are. */
+  /** The loops that are left as they are. */
   get skipped(): readonly Skipped[] {
-    return this.opened?.session.skipped ?? [];
+    const unfillable = [...this.unfillable.values()];
+    const others = (this.opened?.session.skipped ?? []).filter(({ id }) => !this.unfillable.has(id ?? 0));
+    return [...unfillable, ...others];
   }
 
   /** The patches under constraints, and the report. */
@@ -114,18 +119,49 @@ export class ScanSession {
 
   private async open(holes: readonly number[], progress: Progress): Promise<Opened> {
     const asked = holes.join();
-    if (this.opened?.asked === asked) {
+    if (this.opened !== undefined && [this.opened.asked, this.opened.filled].includes(asked)) {
       return this.opened;
     }
-    const selection = { holes: holes.map((id) => ({ id })) };
-    const session = await this.service.openSession(this.scan, selection, progress);
+    const session = await this.openOnFillable(holes, progress);
     const id = session.id ?? '';
     const unconstrained = await this.service.positions(id, {}, progress);
     const glb = await this.service.patches(id, {}, progress);
-    const positions = new Map(byHole(session, unconstrained).map(({ hole, positions }) => [hole.id ?? 0, positions]));
+    const patches = byHole(session, unconstrained);
+    const positions = new Map(patches.map((patch) => [patch.hole.id ?? 0, patch.positions]));
     this.close();
-    this.opened = { id, asked, session, dressing: { glb, positions }, met: undefined };
+    const filled = [...positions.keys()].join();
+    this.opened = { id, asked, filled, session, dressing: { glb, positions }, met: undefined };
     return this.opened;
+  }
+
+  /**
+   * Opens a session on those of the holes that can be filled. The service refuses a choice with a hole that it cannot fill; asked for all
+   * holes, it leaves such holes open and says why.
+   */
+  private async openOnFillable(holes: readonly number[], progress: Progress): Promise<Session> {
+    const fillable = (): number[] => holes.filter((id) => !this.unfillable.has(id));
+    const openOn = (ids: readonly number[]): Promise<Session> =>
+      this.service.openSession(this.scan, { holes: ids.map((id) => ({ id })) }, progress);
+    const first = fillable();
+    try {
+      return await openOn(first.length > 0 ? first : holes);
+    } catch (error) {
+      if (!(error instanceof ProblemError && error.status === 422) || holes.length < 2) {
+        throw error;
+      }
+      const all = await this.service.openSession(this.scan, {}, progress);
+      this.service.close(all.id ?? '');
+      for (const loop of all.skipped ?? []) {
+        if (holes.includes(loop.id ?? 0)) {
+          this.unfillable.set(loop.id ?? 0, loop);
+        }
+      }
+      const rest = fillable();
+      if (rest.length === 0 || rest.length === first.length) {
+        throw error;
+      }
+      return openOn(rest);
+    }
   }
 }
 

@@ -91,6 +91,8 @@ export class EditorElement extends LitElement {
         border-color: var(--error);
         background: var(--error-surface);
         color: var(--error);
+      }
+      .problem p {
         white-space: pre-line;
       }
       progress {
@@ -223,7 +225,7 @@ export class EditorElement extends LitElement {
     if (problem !== undefined) {
       return html`
         <div class="notice problem" role="alert">
-          ${problem}
+          <p>${problem}</p>
           <button @click=${() => this.editor.clearProblem()}>Close</button>
         </div>
       `;

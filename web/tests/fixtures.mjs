@@ -1,0 +1,72 @@
+// Scans that the tests make themselves.
+
+/**
+ * A wavy sheet as GLB, 0.05 scene units a square, without the squares that `missing` says.
+ *
+ * @param {number} side squares of a side
+ * @param {(i: number, j: number) => boolean} missing
+ */
+export function sheetGlb(side, missing) {
+  const at = (i, j) => j * (side + 1) + i;
+  const positions = new Float32Array(3 * (side + 1) ** 2);
+  for (let j = 0; j <= side; j += 1) {
+    for (let i = 0; i <= side; i += 1) {
+      positions.set([0.05 * i, 0.05 * Math.sin(0.4 * i), 0.05 * j], 3 * at(i, j));
+    }
+  }
+  const corners = [];
+  for (let j = 0; j < side; j += 1) {
+    for (let i = 0; i < side; i += 1) {
+      if (!missing(i, j)) {
+        const [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+        corners.push(a, c, b, a, d, c);
+      }
+    }
+  }
+  const indices = Uint32Array.from(corners);
+  const max = [0, 1, 2].map((axis) =>
+    positions.reduce((most, value, at) => (at % 3 === axis ? Math.max(most, value) : most), -1),
+  );
+  const min = [0, 1, 2].map((axis) =>
+    positions.reduce((least, value, at) => (at % 3 === axis ? Math.min(least, value) : least), 9),
+  );
+  const json = {
+    asset: { version: '2.0' },
+    scene: 0,
+    scenes: [{ nodes: [0] }],
+    nodes: [{ mesh: 0 }],
+    meshes: [{ primitives: [{ attributes: { POSITION: 0 }, indices: 1 }] }],
+    accessors: [
+      { bufferView: 0, componentType: 5126, count: positions.length / 3, type: 'VEC3', min, max },
+      { bufferView: 1, componentType: 5125, count: indices.length, type: 'SCALAR' },
+    ],
+    bufferViews: [
+      { buffer: 0, byteOffset: 0, byteLength: positions.byteLength },
+      { buffer: 0, byteOffset: positions.byteLength, byteLength: indices.byteLength },
+    ],
+    buffers: [{ byteLength: positions.byteLength + indices.byteLength }],
+  };
+  let text = JSON.stringify(json);
+  text += ' '.repeat((4 - (text.length % 4)) % 4);
+  const header = Buffer.alloc(20);
+  const binary = Buffer.concat([Buffer.from(positions.buffer), Buffer.from(indices.buffer)]);
+  header.write('glTF');
+  header.writeUInt32LE(2, 4);
+  header.writeUInt32LE(28 + text.length + binary.length, 8);
+  header.writeUInt32LE(text.length, 12);
+  header.write('JSON', 16);
+  const chunk = Buffer.alloc(8);
+  chunk.writeUInt32LE(binary.length, 0);
+  chunk.write('BIN\0', 4);
+  return Buffer.concat([header, Buffer.from(text), chunk, binary]);
+}
+
+/** A sheet of 60 squares with three holes of 6, far from each other. */
+export function sheetWithThreeHoles() {
+  const holes = [
+    [10, 10],
+    [40, 12],
+    [25, 42],
+  ];
+  return sheetGlb(60, (i, j) => holes.some(([x, y]) => i >= x && i < x + 6 && j >= y && j < y + 6));
+}
