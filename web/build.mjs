@@ -3,7 +3,8 @@
 //   node build.mjs            writes dist/
 //   node build.mjs DIRECTORY  writes there instead, for a comparison of bytes
 //
-// The libraries go into a file of their own, vendor.js, so that a change of our own code leaves it as it is.
+// The libraries go into a file of their own, vendor.js, so that a change of our own code leaves it as it is. The worker has what it needs itself:
+// Lit does not run there.
 
 import { cpSync, mkdirSync, rmSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
@@ -36,6 +37,7 @@ rmSync(out, { recursive: true, force: true });
 mkdirSync(join(out, 'editor'), { recursive: true });
 await build({ ...shared, entryPoints: ['src/vendor.ts'], outfile: join(out, 'editor/vendor.js') });
 await build({ ...shared, entryPoints: ['src/main.ts'], outfile: join(out, 'editor/main.js'), plugins: [vendorApart] });
+await build({ ...shared, entryPoints: ['src/geometry_worker.ts'], outfile: join(out, 'editor/worker.js') });
 cpSync(join(here, 'static/index.html'), join(out, 'index.html'));
 for (const file of ['page.css', 'icon.svg']) {
   cpSync(join(here, 'static', file), join(out, 'editor', file));

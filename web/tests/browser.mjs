@@ -117,8 +117,8 @@ class EditorPage {
     return { x: box.x + box.width * (0.53 + right), y: box.y + box.height * (0.54 + down) };
   }
 
-  /** Drags by real pointer events, and waits for what comes of it. */
-  async drag(from, by, steps = 8) {
+  /** Drags by real pointer events, and waits for what comes of it. `held` runs before the pointer goes up. */
+  async drag(from, by, { steps = 8, held = async () => {} } = {}) {
     const { mouse } = this.page;
     await mouse.move(from.x, from.y);
     await mouse.down();
@@ -126,6 +126,7 @@ class EditorPage {
       await mouse.move(from.x + (by.x * step) / steps, from.y + (by.y * step) / steps);
       await this.page.waitForTimeout(30);
     }
+    await held();
     await mouse.up();
     await this.idle();
   }

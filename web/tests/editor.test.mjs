@@ -77,7 +77,20 @@ inEditor('the example is opened, mended, grabbed, undone, redone and saved', asy
   assert.ok((await editor.difference(open, mended)) > 0.01, 'new cloth is seen');
 
   await editor.tool('g');
-  await editor.drag(await editor.onCloth(), { x: 40, y: -40 });
+  const answered = page.waitForResponse((answer) => answer.url().endsWith('/inpaint'));
+  await editor.drag(
+    await editor.onCloth(),
+    { x: 40, y: -40 },
+    {
+      held: async () => {
+        await answered;
+        await editor.idle();
+        const held = await editor.picture();
+        assert.ok((await editor.difference(mended, held)) > 0.002, 'the cloth follows while it is held');
+        await editor.keep('grab');
+      },
+    },
+  );
   const grabbed = await editor.picture();
   assert.ok((await editor.difference(mended, grabbed)) > 0.002, 'the cloth follows');
   const constraints = await editor.model((it) => it.constraintsText());
@@ -110,7 +123,7 @@ inEditor('while dragging, one request is in flight', async (editor, page) => {
     await route.continue();
   });
   await editor.tool('g');
-  await editor.drag(await editor.onCloth(), { x: 60, y: 0 }, 30);
+  await editor.drag(await editor.onCloth(), { x: 60, y: 0 }, { steps: 30 });
   assert.equal(most, 1);
   assert.ok(sent > 1 && sent <= 31, `${sent} requests`);
   await page.unrouteAll({ behavior: 'wait' });
@@ -137,7 +150,12 @@ inEditor('twist, pinch and anchor are steps, and undo goes back to the start', a
   await editor.tool('a');
   await editor.drag(middle, { x: 20, y: -15 });
   await page.getByText(/The point belongs at u/).waitFor();
-  await editor.keep('anchor');
+  await editor.button('Draw the map').click();
+  await editor.idle();
+  await page.locator('darn-chart').scrollIntoViewIfNeeded();
+  assert.match(await page.locator('darn-chart').textContent(), /The point belongs at u/);
+  assert.ok(await editor.model((it) => it.found.found.mapPng.length > 100));
+  await editor.keep('map');
 
   const { edits, anchors } = JSON.parse(await editor.model((it) => it.constraintsText()));
   assert.ok(edits[0].twist.radius > 0.13 && Math.abs(edits[0].twist.angle + 0.942) < 0.01);

@@ -19,27 +19,30 @@ export function boundaryLines(positions: Float32Array, triangles: Uint32Array): 
   return loopsOf(boundaryEdges(welded, triangles, positions.length / 3)).map((loop) => lineOf(positions, loop));
 }
 
-/** For each vertex, the first one at its position. */
+/** For each vertex, the first one at its position: by a hash table with open addressing over the positions' bits. */
 function weld(positions: Float32Array): Uint32Array {
   const count = positions.length / 3;
-  const order = Uint32Array.from({ length: count }, (_, vertex) => vertex);
-  const compare = (a: number, b: number): number => {
-    for (let axis = 0; axis < 3; axis += 1) {
-      const difference = (positions[3 * a + axis] as number) - (positions[3 * b + axis] as number);
-      if (difference !== 0) {
-        return difference;
-      }
-    }
-    return 0;
-  };
-  order.sort((a, b) => compare(a, b) || a - b);
+  const slots = 2 ** Math.ceil(Math.log2(2 * count + 1));
+  const table = new Int32Array(slots).fill(-1);
+  // Adding zero makes negative zeros positive, so that equal positions have equal bits.
+  const bits = new Uint32Array(positions.map((value) => value + 0).buffer);
+  const equal = (a: number, b: number): boolean =>
+    bits[3 * a] === bits[3 * b] && bits[3 * a + 1] === bits[3 * b + 1] && bits[3 * a + 2] === bits[3 * b + 2];
   const welded = new Uint32Array(count);
-  let first = 0;
-  for (const [place, vertex] of order.entries()) {
-    if (place === 0 || compare(vertex, first) !== 0) {
-      first = vertex;
+  for (let vertex = 0; vertex < count; vertex += 1) {
+    let hash = 0;
+    for (let axis = 0; axis < 3; axis += 1) {
+      hash = Math.imul(hash ^ (bits[3 * vertex + axis] as number), 0x9e3779b1);
+      hash ^= hash >>> 15;
     }
-    welded[vertex] = first;
+    let slot = hash & (slots - 1);
+    for (let other = table[slot] as number; other >= 0 && !equal(other, vertex); other = table[slot] as number) {
+      slot = (slot + 1) & (slots - 1);
+    }
+    if ((table[slot] as number) < 0) {
+      table[slot] = vertex;
+    }
+    welded[vertex] = table[slot] as number;
   }
   return welded;
 }

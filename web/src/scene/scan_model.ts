@@ -7,6 +7,7 @@ import {
   Group,
   type Intersection,
   type Material,
+  type Matrix4,
   Mesh,
   MeshBVH,
   MeshStandardMaterial,
@@ -15,7 +16,8 @@ import {
   Vector3,
   acceleratedRaycast,
 } from '../vendor.js';
-import { type BoundaryLine, boundaryLines } from './boundary.js';
+import type { BoundaryLine } from './boundary.js';
+import { GeometryJobs, type PlainMesh } from './geometry_jobs.js';
 
 /** How surfaces are drawn. */
 export type Shading = 'textured' | 'shaded' | 'wireframe';
@@ -31,14 +33,20 @@ export function plainMaterial(color: number, shading: Shading): MeshStandardMate
 /** A loaded scan. */
 export class ScanModel {
   private readonly own = new Map<Mesh, Material | Material[]>();
+  private readonly jobs = new GeometryJobs();
+  /** The space that it takes. */
+  readonly bounds: Box3;
   private plain: MeshStandardMaterial | undefined;
 
   private constructor(readonly root: Group) {
     root.updateMatrixWorld(true);
+    this.bounds = new Box3().setFromObject(root);
     root.traverse((object) => {
       if (object instanceof Mesh) {
         this.own.set(object, object.material as Material | Material[]);
-        object.raycast = acceleratedRaycast;
+        if (!('isSkinnedMesh' in object)) {
+          object.raycast = acceleratedRaycast;
+        }
       }
     });
   }
@@ -51,10 +59,6 @@ export class ScanModel {
 
   get meshes(): Mesh[] {
     return [...this.own.keys()];
-  }
-
-  get bounds(): Box3 {
-    return new Box3().setFromObject(this.root);
   }
 
   /** Chooses how the surface is drawn. */
@@ -87,23 +91,27 @@ export class ScanModel {
   }
 
   /** The boundary loops of the whole scene. */
-  boundaryLines(): BoundaryLine[] {
-    const { positions, triangles } = this.triangles();
-    return boundaryLines(positions, triangles);
+  boundaryLines(): Promise<BoundaryLine[]> {
+    return this.jobs.boundary(joined(this.meshes.map((mesh) => plainMesh(mesh, mesh.matrixWorld))));
+  }
+
+  /** Makes picking fast. Until then every triangle is tried. */
+  async buildTrees(): Promise<void> {
+    for (const mesh of this.meshes) {
+      const tree = await this.jobs.tree(plainMesh(mesh, undefined));
+      mesh.geometry.boundsTree = MeshBVH.deserialize(tree, mesh.geometry);
+    }
   }
 
   /** The nearest point of the scan on a ray. */
   pick(raycaster: Raycaster): Intersection | undefined {
-    for (const mesh of this.own.keys()) {
-      // Built at the first pick: a scan that is only mended needs none.
-      mesh.geometry.boundsTree ??= new MeshBVH(mesh.geometry);
-    }
     raycaster.firstHitOnly = true;
     return raycaster.intersectObjects(this.meshes, false)[0];
   }
 
   /** Frees the memory of the graphics card. */
   dispose(): void {
+    this.jobs.stop();
     this.plain?.dispose();
     for (const [mesh, own] of this.own) {
       mesh.geometry.dispose();
@@ -112,33 +120,50 @@ export class ScanModel {
       }
     }
   }
+}
 
-  private triangles(): { positions: Float32Array; triangles: Uint32Array } {
-    const vertices = this.meshes.reduce((sum, { geometry }) => sum + geometry.getAttribute('position').count, 0);
-    const corners = this.meshes.reduce(
-      (sum, { geometry }) => sum + (geometry.index ?? geometry.getAttribute('position')).count,
-      0,
-    );
-    const positions = new Float32Array(3 * vertices);
-    const triangles = new Uint32Array(corners);
-    const vertex = new Vector3();
-    let [firstVertex, firstCorner] = [0, 0];
-    for (const mesh of this.meshes) {
-      const position = mesh.geometry.getAttribute('position');
-      for (let at = 0; at < position.count; at += 1) {
-        vertex.fromBufferAttribute(position, at).applyMatrix4(mesh.matrixWorld);
-        vertex.toArray(positions, 3 * (firstVertex + at));
-      }
-      const { index } = mesh.geometry;
-      const count = index?.count ?? position.count;
-      for (let at = 0; at < count; at += 1) {
-        triangles[firstCorner + at] = firstVertex + (index?.getX(at) ?? at);
-      }
-      firstVertex += position.count;
-      firstCorner += count;
+/** A mesh's triangles as plain arrays, in the scene's space or, without a matrix, in its own. */
+function plainMesh({ geometry }: Mesh, matrix: Matrix4 | undefined): PlainMesh {
+  const position = geometry.getAttribute('position');
+  const positions = new Float32Array(3 * position.count);
+  const vertex = new Vector3();
+  for (let at = 0; at < position.count; at += 1) {
+    vertex.fromBufferAttribute(position, at);
+    if (matrix !== undefined) {
+      vertex.applyMatrix4(matrix);
     }
-    return { positions, triangles };
+    vertex.toArray(positions, 3 * at);
   }
+  const triangles = geometry.index === null ? sequence(position.count) : new Uint32Array(geometry.index.array);
+  return { positions, triangles };
+}
+
+/** 0, 1, 2 and so on. */
+function sequence(length: number): Uint32Array<ArrayBuffer> {
+  const numbers = new Uint32Array(length);
+  for (let at = 0; at < length; at += 1) {
+    numbers[at] = at;
+  }
+  return numbers;
+}
+
+/** Several meshes as one. */
+function joined(meshes: readonly PlainMesh[]): PlainMesh {
+  const sizeOf = (arrays: readonly { length: number }[]): number => arrays.reduce((sum, it) => sum + it.length, 0);
+  const positions = new Float32Array(sizeOf(meshes.map((mesh) => mesh.positions)));
+  const triangles = new Uint32Array(sizeOf(meshes.map((mesh) => mesh.triangles)));
+  let [firstNumber, firstCorner] = [0, 0];
+  for (const mesh of meshes) {
+    positions.set(mesh.positions, firstNumber);
+    const firstVertex = firstNumber / 3;
+    triangles.set(
+      mesh.triangles.map((vertex) => vertex + firstVertex),
+      firstCorner,
+    );
+    firstNumber += mesh.positions.length;
+    firstCorner += mesh.triangles.length;
+  }
+  return { positions, triangles };
 }
 
 /** Frees a material and its textures. */

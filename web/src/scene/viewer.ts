@@ -100,12 +100,19 @@ export class Viewer {
     this.clear();
     this.scan = scan;
     this.scene.add(scan.root);
-    const size = scan.bounds.getBoundingSphere(new Sphere()).radius || 1;
-    this.rims = new Rims(loops, linesOfLoops(loops, scan.boundaryLines()), size);
-    this.scene.add(this.rims.group);
     scan.setShading(this.look.shading);
+    const sphere = scan.bounds.getBoundingSphere(new Sphere());
+    this.lookAt(scan.bounds, new Vector3(0.5, 0.5, 1));
+    const lines = await scan.boundaryLines();
+    if (this.scan !== scan) {
+      return;
+    }
+    this.rims = new Rims(loops, linesOfLoops(loops, lines), sphere.radius || 1);
+    this.scene.add(this.rims.group);
     const largest = byKind(loops)[0]?.[1][0]?.id ?? 0;
     this.lookAt(scan.bounds, this.rims.viewOf(largest)?.front ?? new Vector3(0.5, 0.5, 1));
+    // Nothing waits for it; a scan that takes its place stops it.
+    scan.buildTrees().catch(() => undefined);
   }
 
   /** Draws the chosen loops wider. */

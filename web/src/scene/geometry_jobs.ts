@@ -1,0 +1,69 @@
+/** Gives long work on a mesh to the worker, and its results back as promises. */
+import type { MeshBVH } from '../vendor.js';
+import type { BoundaryLine } from './boundary.js';
+
+/** A mesh: `x, y, z` of each vertex, three vertices of each triangle. */
+export interface PlainMesh {
+  readonly positions: Float32Array<ArrayBuffer>;
+  readonly triangles: Uint32Array<ArrayBuffer>;
+}
+
+/** A tree of bounding boxes in a form that a worker can send. */
+export type SerializedTree = ReturnType<typeof MeshBVH.serialize>;
+
+export type WorkerRequest = PlainMesh & { readonly id: number; readonly job: 'boundary' | 'tree' };
+export type WorkerAnswer = { readonly id: number } & (
+  { readonly lines: BoundaryLine[] } | { readonly tree: SerializedTree } | { readonly error: string }
+);
+
+/** The worker, started at the first job. */
+export class GeometryJobs {
+  private worker: Worker | undefined;
+  private readonly waiting = new Map<number, (answer: WorkerAnswer) => void>();
+  private nextId = 0;
+
+  /** The boundary loops of a mesh. Takes the mesh's arrays. */
+  async boundary(mesh: PlainMesh): Promise<BoundaryLine[]> {
+    const answer = await this.ask({ ...mesh, job: 'boundary' });
+    return 'lines' in answer ? answer.lines : failed(answer);
+  }
+
+  /** A tree to pick a mesh's triangles by, which it puts into another order. Takes the mesh's arrays. */
+  async tree(mesh: PlainMesh): Promise<SerializedTree> {
+    const answer = await this.ask({ ...mesh, job: 'tree' });
+    return 'tree' in answer ? answer.tree : failed(answer);
+  }
+
+  /** Stops the work that is under way. */
+  stop(): void {
+    this.worker?.terminate();
+    this.worker = undefined;
+    for (const [id, settle] of this.waiting) {
+      settle({ id, error: 'stopped' });
+    }
+    this.waiting.clear();
+  }
+
+  private ask(request: Omit<WorkerRequest, 'id'>): Promise<WorkerAnswer> {
+    this.worker ??= this.start();
+    const id = this.nextId;
+    this.nextId += 1;
+    const answer = new Promise<WorkerAnswer>((resolve) => this.waiting.set(id, resolve));
+    this.worker.postMessage({ ...request, id }, [request.positions.buffer, request.triangles.buffer]);
+    return answer;
+  }
+
+  private start(): Worker {
+    const worker = new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
+    worker.onmessage = ({ data }: MessageEvent<WorkerAnswer>) => {
+      this.waiting.get(data.id)?.(data);
+      this.waiting.delete(data.id);
+    };
+    worker.onerror = () => this.stop();
+    return worker;
+  }
+}
+
+function failed(answer: WorkerAnswer): never {
+  throw new Error('error' in answer ? answer.error : 'the worker answered something else');
+}
