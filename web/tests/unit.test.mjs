@@ -10,6 +10,7 @@ const { boundaryLines, linesOfLoops } = await load('scene/boundary.ts');
 const { partsOf } = await load('service/multipart.ts');
 const { readConstraints, onHoles, statelessMessageOf } = await load('model/constraints.ts');
 const { locate, positionOf, normalOf } = await load('model/cloth.ts');
+const { scanOf } = await load('model/scan_files.ts');
 const { problemOf } = await load('service/problem.ts');
 
 /** A promise and what settles it. */
@@ -168,4 +169,23 @@ test('a problem document is read, and an answer of a proxy is named by its statu
   const other = problemOf(502, null, '<html>');
   assert.match(other.message, /502/);
   assert.equal(other.retryAfter, undefined);
+});
+
+test('a glTF takes the files in that it refers to, and says which one is missing', async () => {
+  const file = (name, ...content) => Object.assign(new Blob(content), { name });
+  const json = JSON.stringify({
+    buffers: [{ uri: 'my%20cloth.bin', byteLength: 3 }, { uri: 'data:,x' }],
+    images: [{ uri: 'textures/plaid.png' }],
+  });
+  const files = [file('plaid.png', 'P'), file('scan.gltf', json), file('my cloth.bin', new Uint8Array([1, 2, 255]))];
+  const packed = await scanOf(files);
+  assert.equal(packed.name, 'scan.gltf');
+  const { buffers, images } = JSON.parse(await packed.file.text());
+  assert.equal(buffers[0].uri, 'data:application/octet-stream;base64,AQL/');
+  assert.equal(buffers[1].uri, 'data:,x');
+  assert.equal(images[0].uri, 'data:image/png;base64,UA==');
+  await assert.rejects(scanOf(files.slice(1)), /plaid\.png/);
+  const glb = file('scan.glb', 'x');
+  assert.deepEqual(await scanOf([file('notes.txt', ''), glb]), { file: glb, name: 'scan.glb' });
+  assert.equal(await scanOf([]), undefined);
 });

@@ -56,6 +56,10 @@ export class Rims {
     }
   }
 
+  setVisible(visible: boolean): void {
+    this.group.visible = visible;
+  }
+
   /** How a loop lies in space; undefined where it has no line. */
   viewOf(loop: number): RimView | undefined {
     return this.views.get(loop);

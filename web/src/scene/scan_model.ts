@@ -11,6 +11,7 @@ import {
   Mesh,
   MeshBVH,
   MeshStandardMaterial,
+  MeshoptDecoder,
   type Raycaster,
   type Texture,
   Vector3,
@@ -53,7 +54,7 @@ export class ScanModel {
 
   /** Reads a GLB, or a glTF with data URIs. */
   static async load(bytes: ArrayBuffer): Promise<ScanModel> {
-    const gltf = await new GLTFLoader().parseAsync(bytes, '');
+    const gltf = await new GLTFLoader().setMeshoptDecoder(MeshoptDecoder).parseAsync(bytes, '');
     return new ScanModel(gltf.scene);
   }
 

@@ -30,13 +30,15 @@ export interface Look {
   readonly shading: Shading;
   /** Whether the new cloth has a colour of its own. */
   readonly tinted: boolean;
+  /** Whether boundary loops have lines. */
+  readonly outlined: boolean;
   /** Whether the scan is shown without its new cloth. */
   readonly before: boolean;
   /** The share of the picture's width, from the left, that shows the scan without its new cloth. */
   readonly split: number;
 }
 
-const FIRST_LOOK: Look = { shading: 'textured', tinted: true, before: false, split: 0 };
+const FIRST_LOOK: Look = { shading: 'textured', tinted: true, outlined: true, before: false, split: 0 };
 
 /** What is under the pointer. */
 export interface Hit {
@@ -108,6 +110,7 @@ export class Viewer {
       return;
     }
     this.rims = new Rims(loops, linesOfLoops(loops, lines), sphere.radius || 1);
+    this.rims.setVisible(this.look.outlined);
     this.scene.add(this.rims.group);
     const largest = byKind(loops)[0]?.[1][0]?.id ?? 0;
     this.lookAt(scan.bounds, this.rims.viewOf(largest)?.front ?? new Vector3(0.5, 0.5, 1));
@@ -147,6 +150,7 @@ export class Viewer {
   setLook(change: Partial<Look>): void {
     const before = this.look;
     this.look = { ...before, ...change };
+    this.rims?.setVisible(this.look.outlined);
     if (before.shading !== this.look.shading) {
       this.scan?.setShading(this.look.shading);
     }

@@ -1,7 +1,9 @@
 /** The chart of a hole: the cloth laid flat, the places of gestures and anchors on it, the path and the map of an anchor search. */
 import type { Uv } from '../contract.js';
 import type { Draft } from '../model/draft.js';
+import { short } from '../model/loops.js';
 import { type TemplateResult, css, html, nothing, svg } from '../vendor.js';
+import { mapCells, rangeOf } from './map_cells.js';
 import { Panel } from './panel.js';
 
 /** Side of the drawing, in its own units. */
@@ -31,12 +33,15 @@ export class ChartPanel extends Panel {
       return nothing;
     }
     const search = found !== undefined && found.hole === hole ? found.found : undefined;
-    const picture = search?.mapPng || patch.hole.chartPng;
+    const picture = patch.hole.chartPng;
+    const map = this.editor.tool === 'anchor' ? ((search?.map ?? []) as (number | null)[]) : [];
+    const range = rangeOf(map);
     const path = (search?.path ?? []).map(({ cell }) => uvOfCell(cell ?? []));
     return html`
       <h2>Chart of hole ${hole}</h2>
       <svg viewBox="0 0 ${SIDE} ${SIDE}" role="img" aria-label=${this.words(hole ?? 0)}>
         ${picture ? svg`<image href="data:image/png;base64,${picture}" width=${SIDE} height=${SIDE} />` : nothing}
+        ${range ? mapCells(map, range, SIDE) : nothing}
         ${
           path.length > 1
             ? svg`<polyline points=${path.map((uv) => at(uv).join()).join(' ')} fill="none" stroke="#0b7285" stroke-width="2" />`
@@ -46,6 +51,14 @@ export class ChartPanel extends Panel {
         ${draft ? placesOf(draft).map((uv) => dot(uv, '#22b8cf')) : nothing}
         ${search?.uv ? dot(search.uv as Uv, '#ffd43b') : nothing}
       </svg>
+      ${
+        range
+          ? html`<p class="small">
+              The map: light where the loss is least (${short(range.least)}), dark where it is largest
+              (${short(range.most)}).
+            </p>`
+          : nothing
+      }
       ${
         search
           ? html`<p class="small">

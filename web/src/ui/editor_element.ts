@@ -1,5 +1,6 @@
 /** `<darn-editor>`: the whole editor, as it is served at `/`. */
 import { Editor } from '../model/editor.js';
+import { scanOf } from '../model/scan_files.js';
 import { Service } from '../service/service.js';
 import { type TemplateResult, LitElement, css, html, nothing } from '../vendor.js';
 import { download } from './download.js';
@@ -11,9 +12,6 @@ import './report_panel.js';
 import { Stage } from './stage.js';
 import { shared } from './styles.js';
 import { TOOLS } from './tools_panel.js';
-
-/** What the person may drop or pick. */
-const SCAN_FILE = /\.(glb|gltf)$/i;
 
 export class EditorElement extends LitElement {
   static override styles = [
@@ -180,7 +178,14 @@ export class EditorElement extends LitElement {
         >
           Save the scan
         </button>
-        <input id="file" type="file" accept=".glb,.gltf" hidden @change=${this.picked} />
+        <input
+          id="file"
+          type="file"
+          accept=".glb,.gltf,.bin,.png,.jpg,.jpeg,.webp"
+          multiple
+          hidden
+          @change=${this.picked}
+        />
       </header>
       <main class=${this.dragging ? 'over' : ''}>
         <darn-stage .editor=${editor}></darn-stage>
@@ -209,8 +214,8 @@ export class EditorElement extends LitElement {
       <div class="welcome">
         <h2>Mend a scan of cloth</h2>
         <p>
-          Drop a glTF file here (GLB, or glTF with its data inside). The service finds its holes and fills them with
-          cloth that continues the folds around them. The scan itself stays as it is.
+          Drop a glTF file here: a GLB, or a glTF together with the files that it refers to. The service finds its holes
+          and fills them with cloth that continues the folds around them. The scan itself stays as it is.
         </p>
         <div class="row">
           <button class="main" @click=${this.pick}>Open a scan</button>
@@ -256,15 +261,19 @@ export class EditorElement extends LitElement {
 
   private readonly picked = (event: Event): void => {
     const input = event.target as HTMLInputElement;
-    this.openFiles([...(input.files ?? [])]);
+    void this.openFiles([...(input.files ?? [])]);
     // So that the same file can be picked again.
     input.value = '';
   };
 
-  private openFiles(files: readonly File[]): void {
-    const scan = files.find((file) => SCAN_FILE.test(file.name)) ?? files[0];
-    if (scan !== undefined) {
-      void this.editor.open(scan, scan.name);
+  private async openFiles(files: readonly File[]): Promise<void> {
+    try {
+      const scan = await scanOf(files);
+      if (scan !== undefined) {
+        await this.editor.open(scan.file, scan.name);
+      }
+    } catch (error) {
+      this.editor.report(error);
     }
   }
 
@@ -306,7 +315,7 @@ export class EditorElement extends LitElement {
   private readonly drop = (event: DragEvent): void => {
     event.preventDefault();
     this.setDragging(false);
-    this.openFiles([...(event.dataTransfer?.files ?? [])]);
+    void this.openFiles([...(event.dataTransfer?.files ?? [])]);
   };
 
   private setDragging(dragging: boolean): void {

@@ -51,14 +51,8 @@ export class LookPanel extends Panel {
           )}
         </div>
       </fieldset>
-      <label>
-        <input
-          type="checkbox"
-          checked
-          @change=${(event: Event) => this.look({ tinted: (event.target as HTMLInputElement).checked })}
-        />
-        New cloth in its own colour
-      </label>
+      <div>${this.check('New cloth in its own colour', (tinted) => ({ tinted }))}</div>
+      <div>${this.check('Outlines of holes and borders', (outlined) => ({ outlined }))}</div>
       <label class="compare">
         Before and after (hold B for before)
         <input
@@ -71,6 +65,11 @@ export class LookPanel extends Panel {
         />
       </label>
     `;
+  }
+
+  private check(name: string, change: (checked: boolean) => Partial<Look>): TemplateResult {
+    const changed = (event: Event): void => this.look(change((event.target as HTMLInputElement).checked));
+    return html`<label><input type="checkbox" checked @change=${changed} />${name}</label>`;
   }
 
   private look(detail: Partial<Look>): void {
