@@ -320,7 +320,7 @@ export interface components {
     schemas: {
         /** @description What a request asks for. Every part may be left out: then all holes are filled with the default weights. */
         Constraints: {
-            /** @description The holes to fill; none given means all of them. */
+            /** @description The holes to fill; none given means all of them. A loop named here is tried whatever its kind, and the request is refused when it cannot be filled; of the others, those that cannot be filled are listed as skipped. */
             holes?: components["schemas"]["HoleSelector"][];
             /** @description Points the new cloth should pass through. */
             anchors?: components["schemas"]["Anchor"][];
@@ -330,12 +330,22 @@ export interface components {
             weights?: string;
             /** @description Direction against gravity, `[x, y, z]`; of any length but zero. */
             up?: number[];
+            /** @description Which loops are filled beside those that `holes` names: `holes` (damage), `openings` (necks, cuffs, the ends of tubes) or `all` (both). Left out: `holes`, or none when `holes` names some. An outer boundary is filled only when `holes` names it. */
+            fill?: string;
+            /** @description Loops that are wider are left unless `holes` names them; in the scene's unit. */
+            maxDiameter?: number;
+            /** @description Loops that are narrower are left unless `holes` names them; in the scene's unit. */
+            minDiameter?: number;
+            /** @description The ids of loops to leave. */
+            except?: number[];
+            /** @description Whether a patch is applied that is no plausible cloth (stretched beyond measure, cutting itself). Otherwise its loop is skipped with the code `no_plausible_fill`. */
+            acceptDoubtful?: boolean;
         };
         /** @description One hole, by exactly one of its fields. */
         HoleSelector: {
             /** @description The loop's id, as FindHoles gives it. */
             id?: number;
-            /** @description A point `[x, y, z]`: the hole whose rim comes nearest to it. */
+            /** @description A point `[x, y, z]`: the loop that comes nearest to it, whatever its kind; an outer boundary only when the scan has no other loop. */
             near?: number[];
             /** @description Damaged cloth to cut out first. Not served by this version yet. */
             cut?: components["schemas"]["Cut"];
@@ -443,6 +453,17 @@ export interface components {
             /** @description The loss's gradient there, `[d/du, d/dv]`. */
             gradient?: number[];
         };
+        /** @description What speaks for or against a loop being a finished opening. */
+        Evidence: {
+            /** @description Stable word for what was looked at, such as `smooth_rim`. */
+            code?: string;
+            /** @description What was measured; the reason says what it means. */
+            value?: number;
+            /** @description How much it counts: above 0 for an opening, below 0 for a hole. The sum of all of them is the logarithm of the odds. */
+            weight?: number;
+            /** @description The same in words, for a person. */
+            reason?: string;
+        };
         /** @description A boundary loop of the welded mesh. */
         Loop: {
             /** @description Stable within a scan: the loops in order of their lowest vertex. */
@@ -463,6 +484,12 @@ export interface components {
             mesh?: string;
             /** @description Connected component of the cloth it belongs to, counted from 0. */
             component?: number;
+            /** @description Largest distance between two of its vertices, in the scene's unit. */
+            diameter?: number;
+            /** @description How sure the kind is, from 0.5 to 1: the probability that a loop which cloth surrounds is a hole, or an opening; 1 for other kinds, which turning alone tells apart. */
+            confidence?: number;
+            /** @description What the kind of a hole or an opening rests on. */
+            evidence?: components["schemas"]["Evidence"][];
         };
         /** @description What FindHoles answers. */
         HolesReport: {
@@ -511,9 +538,9 @@ export interface components {
             length?: number;
             /** @description Vertices of the rim. */
             vertices?: number;
-            /** @description The cloth around the hole, laid flat. */
+            /** @description The cloth around the hole, laid flat; left out where it cannot be. */
             chart?: components["schemas"]["ChartReport"];
-            /** @description The 64 x 64 grid the network saw. */
+            /** @description The 64 x 64 grid the network saw; left out where there is no chart. */
             grid?: components["schemas"]["GridReport"];
             /** @description The new cloth. */
             patch?: components["schemas"]["PatchReport"];
@@ -525,6 +552,8 @@ export interface components {
             notes?: string[];
             /** @description The hole's gestures, in the order of the request. */
             edits?: components["schemas"]["EditReport"][];
+            /** @description Why the patch is no plausible cloth, each reason for a person; empty for a sound patch. Applied only when the request accepts doubtful patches. */
+            doubts?: string[];
         };
         /** @description How well the cloth around a hole lies flat. */
         ChartReport: {
@@ -558,7 +587,7 @@ export interface components {
             faces?: number;
             /** @description Its area, in the scene's unit squared. */
             area?: number;
-            /** @description Mean stretch: edge length in the patch over edge length in the chart. */
+            /** @description Mean stretch: edge length in the patch over edge length in the chart; 1 where there is no chart. */
             stretchMean?: number;
             /** @description The same, largest. */
             stretchMax?: number;
@@ -570,10 +599,12 @@ export interface components {
             selfIntersections?: number;
             /** @description Iterations of strain limiting. */
             strainIterations?: number;
-            /** @description What brought the network's cloth to rest: `strain_limiting`, or `strain_limiting+collisions` where layers were pushed apart. */
+            /** @description What brought the patch to rest: `strain_limiting`, or `fairing` where there is no chart; `+collisions` follows where layers were pushed apart. */
             refinement?: string;
             /** @description Share of the network's folds that was kept, 0 to 1: 1 where the network is right about the cloth around the hole; towards 0, as on smooth cloth that does not lie flat, a fair surface takes the place of the folds. */
             networkShare?: number;
+            /** @description How the hole was filled: `network`, or `fair` where the cloth around it cannot be laid flat: a fair surface without folds, which takes no anchors and no gestures. */
+            method?: string;
         };
         /** @description How an anchor was kept. */
         AnchorReport: {
@@ -608,7 +639,7 @@ export interface components {
             /** @description What a person should know about this scan. */
             notes?: string[];
         };
-        /** @description A hole of a session: what stays the same whatever the constraints, and the cloth as it is without any. */
+        /** @description A hole of a session: what stays the same whatever the constraints, and the cloth as it is without any. Of a hole without a chart the uvs, the grid and the picture are empty. */
         SessionHole: {
             /** @description The loop's id. */
             id?: number;
@@ -635,10 +666,12 @@ export interface components {
             id?: number;
             /** @description What the loop is. */
             kind?: components["schemas"]["LoopKind"];
-            /** @description Stable word for the reason, such as `outer_boundary` or `not_selected`. */
+            /** @description Stable word for the reason, such as `outer_boundary`, `not_selected` or `no_plausible_fill`. */
             code?: string;
             /** @description The reason, for a person. */
             reason?: string;
+            /** @description The patch that was made and not applied, of a loop skipped as `no_plausible_fill`. */
+            patch?: components["schemas"]["PatchReport"];
         };
         /** @description Milliseconds spent on a whole scan. */
         ScanTimings: {
@@ -674,7 +707,7 @@ export interface components {
          * @description What a boundary loop is.
          * @enum {string}
          */
-        LoopKind: "LOOP_KIND_UNSPECIFIED" | "HOLE" | "OUTER_BOUNDARY" | "TUBE_END";
+        LoopKind: "LOOP_KIND_UNSPECIFIED" | "HOLE" | "OUTER_BOUNDARY" | "TUBE_END" | "OPENING";
         /** @description A problem document (RFC 9457) */
         Problem: {
             /** @constant */
@@ -740,6 +773,8 @@ export interface operations {
                 headers: {
                     /** @description Holes filled */
                     "darn-holes-filled"?: number;
+                    /** @description How it went: `filled=3 skipped=1 doubtful=0`; skipped are holes that should have been filled and could not be */
+                    "darn-result"?: string;
                     /** @description Boundary loops left as they were */
                     "darn-loops-skipped"?: number;
                     /** @description Largest distance between the cloth and an anchor, those of gestures included, in the scene's unit; absent when there are none */
@@ -1294,6 +1329,8 @@ export interface operations {
                 headers: {
                     /** @description Holes filled */
                     "darn-holes-filled"?: number;
+                    /** @description How it went: `filled=3 skipped=1 doubtful=0`; skipped are holes that should have been filled and could not be */
+                    "darn-result"?: string;
                     /** @description Boundary loops left as they were */
                     "darn-loops-skipped"?: number;
                     /** @description Largest distance between the cloth and an anchor, those of gestures included, in the scene's unit; absent when there are none */
@@ -1553,6 +1590,8 @@ export interface operations {
                 headers: {
                     /** @description Holes filled */
                     "darn-holes-filled"?: number;
+                    /** @description How it went: `filled=3 skipped=1 doubtful=0`; skipped are holes that should have been filled and could not be */
+                    "darn-result"?: string;
                     /** @description Boundary loops left as they were */
                     "darn-loops-skipped"?: number;
                     /** @description Largest distance between the cloth and an anchor, those of gestures included, in the scene's unit; absent when there are none */

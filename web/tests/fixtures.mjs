@@ -61,12 +61,18 @@ export function sheetGlb(side, missing) {
   return Buffer.concat([header, Buffer.from(text), chunk, binary]);
 }
 
-/** A sheet of 60 squares with three holes of 6, far from each other. */
+/** A sheet of 60 squares with three holes far from each other, their rims ragged as damage is. */
 export function sheetWithThreeHoles() {
   const holes = [
     [10, 10],
     [40, 12],
     [25, 42],
   ];
-  return sheetGlb(60, (i, j) => holes.some(([x, y]) => i >= x && i < x + 6 && j >= y && j < y + 6));
+  // Six squares a side, and every other square along the sides.
+  const inHole = (i, j) => {
+    const inside = (value) => value >= 0 && value < 6;
+    const tooth = (along, across) => inside(along) && along % 2 === 1 && (across === -1 || across === 6);
+    return (inside(i) && inside(j)) || tooth(i, j) || tooth(j, i);
+  };
+  return sheetGlb(60, (i, j) => holes.some(([x, y]) => inHole(i - x, j - y)));
 }

@@ -8,7 +8,7 @@ const { Latest } = await load('model/latest.ts');
 const { History } = await load('model/history.ts');
 const { boundaryLines, linesOfLoops } = await load('scene/boundary.ts');
 const { partsOf } = await load('service/multipart.ts');
-const { readConstraints, onHoles, statelessMessageOf } = await load('model/constraints.ts');
+const { readConstraints, onHoles, selectionOf, statelessMessageOf } = await load('model/constraints.ts');
 const { locate, positionOf, normalOf } = await load('model/cloth.ts');
 const { scanOf } = await load('model/scan_files.ts');
 const { problemOf } = await load('service/problem.ts');
@@ -134,12 +134,24 @@ test('constraints come back as they were written, and others are refused with wh
     anchors: [{ hole: 1, position: [0, 0, 0] }],
     edits: [{ hole: 2, grab: { uv: [0.5, 0.5], offset: [0, 1, 0] } }],
   };
-  const text = JSON.stringify(statelessMessageOf([1, 2], constraints));
-  assert.deepEqual(readConstraints(text), { holes: [1, 2], constraints });
+  const text = JSON.stringify(statelessMessageOf({ holes: [1, 2], acceptDoubtful: false }, constraints));
+  assert.deepEqual(readConstraints(text), { holes: [1, 2], acceptDoubtful: false, constraints });
   assert.deepEqual(onHoles(constraints, new Set([2])), { anchors: [], edits: constraints.edits });
   for (const bad of ['', '[]', '{"cut": 1}', '{"holes": [{"near": [0, 0, 0]}]}', '{"edits": [1]}']) {
     assert.throws(() => readConstraints(bad), bad);
   }
+});
+
+test('holes are chosen by leaving others out, other loops by name', () => {
+  const kinds = ['OUTER_BOUNDARY', 'HOLE', 'HOLE', 'OPENING'];
+  const loops = kinds.map((kind, id) => ({ id, kind }));
+  const choice = (...ids) => selectionOf(loops, { holes: ids, acceptDoubtful: false });
+  assert.deepEqual(choice(1, 2), {});
+  assert.deepEqual(choice(2), { except: [1] });
+  assert.deepEqual(choice(1, 2, 3), { holes: [{ id: 3 }], fill: 'holes' });
+  assert.deepEqual(choice(1, 3), { holes: [{ id: 3 }], fill: 'holes', except: [2] });
+  assert.deepEqual(choice(3), { holes: [{ id: 3 }], except: [1, 2] });
+  assert.deepEqual(selectionOf(loops, { holes: [1, 2], acceptDoubtful: true }), { acceptDoubtful: true });
 });
 
 test('a place on cloth keeps its uv and follows the positions', () => {

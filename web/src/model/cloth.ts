@@ -11,8 +11,16 @@ export interface ClothPoint {
   readonly weights: Vec3;
 }
 
-/** The place at a uv; undefined outside the patch. */
+/** Whether a patch has a chart: cloth that cannot be laid flat has none, and then no place on the patch has a uv. */
+export function hasChart({ hole }: Patch): boolean {
+  return (hole.patchUvs?.length ?? 0) > 0;
+}
+
+/** The place at a uv; undefined outside the patch, and without a chart. */
 export function locate(patch: Patch, uv: Uv): ClothPoint | undefined {
+  if (!hasChart(patch)) {
+    return undefined;
+  }
   const { patchFaces = [], patchUvs = [], id = 0 } = patch.hole;
   const corner = (vertex: number): Uv => [patchUvs[2 * vertex] as number, patchUvs[2 * vertex + 1] as number];
   for (let face = 0; face + 2 < patchFaces.length; face += 3) {

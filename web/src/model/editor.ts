@@ -3,7 +3,9 @@ import type { AnchorFound, HoleReport, Info, Loop, Report, Skipped, Uv } from '.
 import { describeError, isAbort } from '../service/problem.js';
 import type { Progress } from '../service/requests.js';
 import type { Service } from '../service/service.js';
+import { hasChart } from './cloth.js';
 import {
+  type Choice,
   type ClothConstraints,
   NO_CONSTRAINTS,
   messageOf,
@@ -17,12 +19,10 @@ import { Latest } from './latest.js';
 import { isHole } from './loops.js';
 import { type Patch, ScanSession } from './scan_session.js';
 
-/** A state that undo can return to. It has the positions, so that it is shown at once. */
-export interface Step {
+/** A state that undo can return to: what is filled, and how. It has the positions, so that it is shown at once. */
+export interface Step extends Choice {
   /** What was done, for the buttons of undo and redo. */
   readonly label: string;
-  /** The holes that are filled, by id. */
-  readonly holes: readonly number[];
   readonly constraints: ClothConstraints;
   readonly patches: readonly Patch[];
   readonly report: Report | undefined;
@@ -54,13 +54,22 @@ export interface FoundAnchor {
   readonly found: AnchorFound;
 }
 
-const START: Step = { label: 'Open', holes: [], constraints: NO_CONSTRAINTS, patches: [], report: undefined };
+const START: Step = {
+  label: 'Open',
+  holes: [],
+  acceptDoubtful: false,
+  constraints: NO_CONSTRAINTS,
+  patches: [],
+  report: undefined,
+};
 
 /** The editor's state. It emits `change` whenever something shown has changed, and `opened` after another scan was opened. */
 export class Editor extends EventTarget {
   scan: OpenScan | undefined;
   /** The loops chosen in the panel, by id. */
   chosen: ReadonlySet<number> = new Set();
+  /** Whether the next mend applies patches that are no plausible cloth. */
+  acceptDoubtful = false;
   /** The loops that the service left as they were at the last mend, with why. */
   skipped: readonly Skipped[] = [];
   tool: Tool = 'look';
@@ -87,6 +96,11 @@ export class Editor extends EventTarget {
 
   get step(): Step {
     return this.history.present;
+  }
+
+  /** The patches that take gestures and anchors: those with a chart. */
+  get editable(): readonly Patch[] {
+    return this.step.patches.filter(hasChart);
   }
 
   /** The patches to show: those of the draft while there is one. */
@@ -118,11 +132,12 @@ export class Editor extends EventTarget {
       const bytes = await file.arrayBuffer();
       const { loops = [], notes = [] } = await this.service.holes(file, progress);
       this.session?.close();
-      this.session = new ScanSession(this.service, file);
+      this.session = new ScanSession(this.service, file, loops);
       this.scan = { file, name, bytes, loops, notes };
       this.history = new History<Step>(START);
       this.chosen = new Set(loops.filter(isHole).map((loop) => loop.id ?? 0));
       this.skipped = [];
+      this.acceptDoubtful = false;
       this.found = undefined;
       this.dropDraft();
       const holes = this.chosen.size;
@@ -153,11 +168,18 @@ export class Editor extends EventTarget {
     this.changed();
   }
 
+  /** Chooses whether the next mend applies patches that are no plausible cloth. */
+  setAcceptDoubtful(accept: boolean): void {
+    this.acceptDoubtful = accept;
+    this.changed();
+  }
+
   /** Fills the chosen holes, and keeps those already filled that are still chosen. */
   async mend(): Promise<void> {
     const holes = [...this.chosen].sort((a, b) => a - b);
     const count = `${holes.length} ${holes.length === 1 ? 'hole' : 'holes'}`;
-    await this.apply(`Mend ${count}`, holes, onHoles(this.step.constraints, this.chosen));
+    const { acceptDoubtful } = this;
+    await this.apply(`Mend ${count}`, { holes, acceptDoubtful }, onHoles(this.step.constraints, this.chosen));
   }
 
   /** Shows a gesture while it is made: sends it when the answer to the one before has come. An anchor's place is found only at its commit. */
@@ -173,7 +195,7 @@ export class Editor extends EventTarget {
         return;
       }
       try {
-        const patches = await session.preview(step.holes, messageOf(withGesture(step.constraints, draft)));
+        const patches = await session.preview(step, messageOf(withGesture(step.constraints, draft)));
         if (this.draft !== undefined && this.step === step) {
           this.draftPatches = patches;
           this.changed();
@@ -194,7 +216,7 @@ export class Editor extends EventTarget {
       await this.placeAnchor(draft);
     } else {
       const constraints = withGesture(this.step.constraints, draft);
-      await this.apply(NAMES[draft.kind], this.step.holes, constraints);
+      await this.apply(NAMES[draft.kind], this.step, constraints);
     }
   }
 
@@ -214,7 +236,7 @@ export class Editor extends EventTarget {
     let result: FoundAnchor | undefined;
     await this.working(map ? 'Drawing the map' : 'Searching', async (progress) => {
       const query = { hole, target: [...position], map };
-      const found = await this.session?.optimizeAnchor(this.step.holes, query, progress);
+      const found = await this.session?.optimizeAnchor(this.step, query, progress);
       if (found !== undefined) {
         result = { hole, found };
         this.found = result;
@@ -229,7 +251,7 @@ export class Editor extends EventTarget {
     const uv = (await this.findAnchor(draft, false))?.found.uv;
     if (uv !== undefined) {
       const constraints = withAnchor(this.step.constraints, draft, uv as Uv);
-      await this.apply(draft.hard ? 'Hard anchor' : NAMES.anchor, this.step.holes, constraints);
+      await this.apply(draft.hard ? 'Hard anchor' : NAMES.anchor, this.step, constraints);
     }
   }
 
@@ -248,8 +270,7 @@ export class Editor extends EventTarget {
 
   /** The constraints of the present step, as `POST /inpaint` takes them. */
   constraintsText(): string {
-    const { holes, constraints } = this.step;
-    return JSON.stringify(statelessMessageOf(holes, constraints), undefined, 2);
+    return JSON.stringify(statelessMessageOf(this.step, this.step.constraints), undefined, 2);
   }
 
   /** Applies constraints that were copied or saved before. */
@@ -264,7 +285,8 @@ export class Editor extends EventTarget {
     const { scan, step } = this;
     const all = (scan?.loops ?? []).filter(isHole).map((loop) => loop.id ?? 0);
     const holes = [...(file.holes ?? (step.holes.length > 0 ? step.holes : all))].sort((a, b) => a - b);
-    await this.apply('Load constraints', holes, file.constraints);
+    this.acceptDoubtful = file.acceptDoubtful;
+    await this.apply('Load constraints', { holes, acceptDoubtful: file.acceptDoubtful }, file.constraints);
     this.choose(new Set(this.step.holes));
   }
 
@@ -273,7 +295,7 @@ export class Editor extends EventTarget {
     let result: Blob | undefined;
     await this.working('Saving', async (progress) => {
       const { holes, constraints } = this.step;
-      result = await this.session?.result(holes, messageOf(constraints), progress);
+      result = await this.session?.result(this.step, messageOf(constraints), progress);
       this.message = `Saved with ${holes.length} filled ${holes.length === 1 ? 'hole' : 'holes'}.`;
     });
     return result;
@@ -300,15 +322,16 @@ export class Editor extends EventTarget {
   }
 
   /** Asks the service for a state and makes it a step. */
-  private async apply(label: string, holes: readonly number[], constraints: ClothConstraints): Promise<void> {
+  private async apply(label: string, choice: Choice, constraints: ClothConstraints): Promise<void> {
     await this.working(label, async (progress) => {
-      if (this.session === undefined || holes.length === 0) {
+      if (this.session === undefined || choice.holes.length === 0) {
         return;
       }
-      const { patches, report } = await this.session.mend(holes, messageOf(constraints), progress);
+      const { patches, report } = await this.session.mend(choice, messageOf(constraints), progress);
       this.skipped = this.session.skipped;
-      const filled = patches.map((patch) => patch.hole.id ?? 0);
-      this.history.push({ label, holes: filled, constraints, patches, report });
+      const holes = patches.map((patch) => patch.hole.id ?? 0);
+      const { acceptDoubtful } = choice;
+      this.history.push({ label, holes, acceptDoubtful, constraints, patches, report });
       this.message = this.messageOfStep(label, this.history.present);
     });
     this.dropDraft();

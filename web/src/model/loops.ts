@@ -12,6 +12,7 @@ export interface KindStyle {
 
 const STYLES: ReadonlyMap<string, KindStyle> = new Map([
   ['HOLE', { plural: 'Holes', singular: 'Hole', color: '#d9480f', line: 'solid' }],
+  ['OPENING', { plural: 'Openings', singular: 'Opening', color: '#9c5fd0', line: 'dotted' }],
   ['TUBE_END', { plural: 'Ends of sleeves', singular: 'End of a sleeve', color: '#37a04d', line: 'dotted' }],
   ['OUTER_BOUNDARY', { plural: 'Borders', singular: 'Border', color: '#3f86c9', line: 'dashed' }],
 ]);
@@ -23,9 +24,14 @@ export function styleOf(kind: string): KindStyle {
   return STYLES.get(kind) ?? { plural: name, singular: name, color: '#862e9c', line: 'dotted' };
 }
 
-/** Whether the service fills loops of this kind. */
+/** Whether the service fills a loop unasked. */
 export function isHole(loop: Loop): boolean {
   return loop.kind === 'HOLE';
+}
+
+/** Whether a loop can be chosen: the cloth's own border stays. */
+export function isFillable(loop: Loop): boolean {
+  return loop.kind !== 'OUTER_BOUNDARY';
 }
 
 /** Kinds in the order of the panel, each with its loops, longest first. */

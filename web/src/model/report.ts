@@ -2,6 +2,8 @@
 import type { HoleReport, Report } from '../contract.js';
 import { short } from './loops.js';
 
+const NO_CHART = 'The cloth around it cannot be laid flat: a fair surface without folds, which takes no gestures.';
+
 /** One sentence or two for each hole. */
 export function holeInWords(hole: HoleReport): string[] {
   const patch = hole.patch ?? {};
@@ -9,7 +11,7 @@ export function holeInWords(hole: HoleReport): string[] {
   const lines = [
     `Hole ${hole.id}: ${faces} new triangles, area ${short(patch.area)}, on a rim of length ${short(hole.length)}.`,
     `${stretchInWords(patch.stretchMean, patch.stretchMax)} ${crossingsInWords(patch.selfIntersections ?? 0)}`,
-    shareInWords(patch.networkShare),
+    patch.method === 'fair' ? NO_CHART : shareInWords(patch.networkShare),
   ];
   for (const anchor of hole.anchors ?? []) {
     const beyond = anchor.beyondReach ?? 0;
@@ -19,7 +21,9 @@ export function holeInWords(hole: HoleReport): string[] {
   for (const edit of hole.edits ?? []) {
     lines.push(`A gesture is followed to within ${short(edit.distance)}.`);
   }
-  return [...lines, ...(hole.notes ?? [])].filter((line) => line !== '');
+  return [...lines, ...(hole.doubts ?? []).map((doubt) => `Doubtful: ${doubt}.`), ...(hole.notes ?? [])].filter(
+    (line) => line !== '',
+  );
 }
 
 /** The whole report in one sentence. */

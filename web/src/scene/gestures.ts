@@ -91,7 +91,7 @@ export class Gestures {
     }
     const hit = this.viewer.pick(event.clientX, event.clientY);
     const cloth = this.held(hit?.cloth);
-    if (hit === undefined || (cloth === undefined && (tool !== 'anchor' || this.editor.step.patches.length === 0))) {
+    if (hit === undefined || (cloth === undefined && (tool !== 'anchor' || this.editor.editable.length === 0))) {
       return;
     }
     event.stopImmediatePropagation();
@@ -170,7 +170,7 @@ export class Gestures {
 
   private anchorAt({ cloth }: Hold, target: Vector3): Draft {
     const position: Vec3 = target.toArray();
-    const nearest = nearestPatch(this.editor.step.patches, position)?.hole.id ?? 0;
+    const nearest = nearestPatch(this.editor.editable, position)?.hole.id ?? 0;
     const { draft } = this.editor;
     const hard = draft?.kind === 'anchor' && draft.hard;
     return { kind: 'anchor', hole: cloth?.point.hole ?? nearest, position, hard };

@@ -1,6 +1,6 @@
 /** The new cloth of one hole as three.js shows it: its surface follows the patch's positions, and a hit on it has a uv. */
 import type { Uv } from '../contract.js';
-import { type ClothPoint, locate } from '../model/cloth.js';
+import { type ClothPoint, hasChart, locate } from '../model/cloth.js';
 import type { Patch } from '../model/scan_session.js';
 import {
   BufferAttribute,
@@ -50,7 +50,7 @@ export class PatchModel {
     const id = patch.hole.id ?? 0;
     const first = patch.dressing.positions.get(id) ?? patch.positions;
     const position = surface.getAttribute('position');
-    this.rim = (patch.hole.rimUvs?.length ?? 0) / 2;
+    this.rim = (patch.hole.rimPositions?.length ?? 0) / 3;
     this.corners = cornerTable(position.array as Float32Array, first);
     this.firstNormals = new Float32Array(surface.getAttribute('normal').array);
     const normals = vertexNormals(first, patch.hole.patchFaces ?? []);
@@ -101,9 +101,9 @@ export class PatchModel {
     geometry.computeBoundingBox();
   }
 
-  /** The place of a hit on the mesh. */
+  /** The place of a hit on the mesh; undefined without a chart. */
   pointOf(hit: Intersection): ClothPoint | undefined {
-    if (hit.face === null || hit.face === undefined) {
+    if (hit.face === null || hit.face === undefined || !hasChart(this.patch)) {
       return undefined;
     }
     const vertices = [hit.face.a, hit.face.b, hit.face.c].map((corner) => this.corners[corner] as number);

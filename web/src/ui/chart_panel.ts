@@ -26,9 +26,9 @@ export class ChartPanel extends Panel {
   ].flat();
 
   protected override render(): TemplateResult | typeof nothing {
-    const { draft, found, step } = this.editor;
-    const hole = draft?.hole ?? found?.hole ?? step.patches[0]?.hole.id;
-    const patch = step.patches.find((it) => it.hole.id === hole);
+    const { draft, found, editable } = this.editor;
+    const hole = draft?.hole ?? found?.hole ?? editable[0]?.hole.id;
+    const patch = editable.find((it) => it.hole.id === hole);
     if (patch === undefined) {
       return nothing;
     }

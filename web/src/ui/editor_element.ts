@@ -342,7 +342,7 @@ export class EditorElement extends LitElement {
       return;
     }
     const tool = TOOLS.find((it) => it.key.toLowerCase() === key)?.tool;
-    if (tool !== undefined && (tool === 'look' || this.editor.step.patches.length > 0)) {
+    if (tool !== undefined && (tool === 'look' || this.editor.editable.length > 0)) {
       this.editor.setTool(tool);
     } else if (key === 'f') {
       this.stage?.viewer?.frame();

@@ -1,8 +1,11 @@
 /** The list of boundary loops: which to fill, how long they are, why some are left as they are. */
 import type { Loop } from '../contract.js';
-import { byKind, isHole, short, styleOf } from '../model/loops.js';
+import { byKind, isFillable, isHole, short, styleOf } from '../model/loops.js';
 import { type TemplateResult, css, html, nothing, svg } from '../vendor.js';
 import { Panel } from './panel.js';
+
+/** Reasons to leave a loop that are only this list's own choice. */
+const CHOICES = new Set(['not_selected', 'excepted', 'outer_boundary', 'tube_end', 'opening']);
 
 /** The event `darn-frame` asks the picture to show the loop in `detail`. */
 export class HolesPanel extends Panel {
@@ -13,7 +16,7 @@ export class HolesPanel extends Panel {
         margin: 0 0 0.75rem;
         padding: 0;
         list-style: none;
-        max-height: 14rem;
+        max-height: 18rem;
         overflow: auto;
       }
       li {
@@ -26,6 +29,12 @@ export class HolesPanel extends Panel {
         border-color: transparent;
         background: none;
         text-align: left;
+      }
+      .doubtful {
+        display: flex;
+        align-items: center;
+        gap: 4px;
+        margin-bottom: 6px;
       }
       .why {
         grid-column: 2 / -1;
@@ -48,7 +57,7 @@ export class HolesPanel extends Panel {
     return html`
       <h2>Holes</h2>
       ${byKind(loops).map(([kind, members]) => this.group(kind, members))}
-      ${holes.length === 0 ? html`<p>This scan has no holes to fill.</p>` : nothing}
+      ${holes.length === 0 ? html`<p>This scan has no holes to fill.</p>` : nothing} ${this.doubtful()}
       <div class="row">
         <button class="main" id="mend" ?disabled=${chosen.size === 0 || work !== undefined} @click=${this.mend}>
           Mend ${chosen.size === 1 ? '1 hole' : `${chosen.size} holes`}
@@ -56,6 +65,21 @@ export class HolesPanel extends Panel {
         <button ?disabled=${holes.length === 0} @click=${() => this.editor.choose(new Set(holes))}>All</button>
         <button ?disabled=${chosen.size === 0} @click=${() => this.editor.choose(new Set())}>None</button>
       </div>
+    `;
+  }
+
+  /** The choice to apply patches that were made and not applied, once there are such. */
+  private doubtful(): TemplateResult | typeof nothing {
+    const { skipped, acceptDoubtful } = this.editor;
+    if (!acceptDoubtful && !skipped.some(({ code }) => code === 'no_plausible_fill')) {
+      return nothing;
+    }
+    const change = (event: Event): void => this.editor.setAcceptDoubtful((event.target as HTMLInputElement).checked);
+    return html`
+      <label class="doubtful">
+        <input type="checkbox" .checked=${acceptDoubtful} @change=${change} />
+        Mend with doubtful cloth, too
+      </label>
     `;
   }
 
@@ -77,12 +101,12 @@ export class HolesPanel extends Panel {
     const id = loop.id ?? 0;
     const { step, skipped, chosen } = this.editor;
     const filled = step.holes.includes(id);
-    const skip = skipped.find((it) => it.id === id && it.code !== 'not_selected');
+    const skip = skipped.find((it) => it.id === id && !CHOICES.has(it.code ?? ''));
     const name = `${styleOf(loop.kind ?? '').singular} ${id}`;
     return html`
       <li>
         ${
-          isHole(loop)
+          isFillable(loop)
             ? html`<input
                 type="checkbox"
                 aria-label="Choose ${name}"
@@ -95,7 +119,7 @@ export class HolesPanel extends Panel {
           ${name}${filled ? ' ✓ mended' : ''}
         </button>
         <span class="quiet small">${short(loop.length)} · ${loop.vertices} vertices</span>
-        ${skip ? html`<span class="why quiet small">Left open: ${skip.reason}.</span>` : nothing}
+        ${sureness(loop)} ${skip ? html`<span class="why quiet small">Left open: ${skip.reason}.</span>` : nothing}
       </li>
     `;
   }
@@ -122,6 +146,20 @@ export class HolesPanel extends Panel {
   }
 
   private readonly mend = (): void => void this.editor.mend();
+}
+
+/** How sure the service is about a kind, and why, where it had to decide between a hole and an opening. */
+function sureness({ confidence = 0, evidence = [] }: Loop): TemplateResult | typeof nothing {
+  if (evidence.length === 0) {
+    return nothing;
+  }
+  const strongest = [...evidence].sort((a, b) => Math.abs(b.weight ?? 0) - Math.abs(a.weight ?? 0));
+  return html`
+    <details class="why quiet small">
+      <summary>${Math.round(confidence * 100)} % sure</summary>
+      ${strongest.map(({ reason }) => html`<p>${reason}</p>`)}
+    </details>
+  `;
 }
 
 customElements.define('darn-holes', HolesPanel);

@@ -78,7 +78,7 @@ export class ToolsPanel extends Panel {
   ].flat();
 
   protected override render(): TemplateResult {
-    const { tool, step } = this.editor;
+    const { tool, step, editable } = this.editor;
     const help = TOOLS.find((it) => it.tool === tool)?.help ?? '';
     return html`
       <h2>Tools</h2>
@@ -89,7 +89,7 @@ export class ToolsPanel extends Panel {
               aria-pressed=${it.tool === tool}
               aria-keyshortcuts=${it.key}
               title="${it.name} (${it.key})"
-              ?disabled=${step.patches.length === 0 && it.tool !== 'look'}
+              ?disabled=${editable.length === 0 && it.tool !== 'look'}
               @click=${() => this.editor.setTool(it.tool)}
             >
               ${it.name}
@@ -97,15 +97,15 @@ export class ToolsPanel extends Panel {
           `,
         )}
       </div>
-      <p class="quiet small">${step.patches.length === 0 ? 'Mend a hole to edit its new cloth.' : help}</p>
-      ${tool === 'look' || step.patches.length === 0 ? nothing : this.form(this.draftOf(tool))}
+      <p class="quiet small">${editable.length > 0 ? help : noTools(step.patches.length)}</p>
+      ${tool === 'look' || editable.length === 0 ? nothing : this.form(this.draftOf(tool))}
     `;
   }
 
   /** The gesture that is being made, or one that changes nothing yet. */
   private draftOf(kind: DraftKind): Draft | undefined {
-    const { draft, step } = this.editor;
-    const [patch] = step.patches;
+    const { draft, editable } = this.editor;
+    const [patch] = editable;
     return draft?.kind === kind ? draft : patch && firstDraft(kind, patch);
   }
 
@@ -136,7 +136,7 @@ export class ToolsPanel extends Panel {
   }
 
   private holeField(draft: Draft): TemplateResult | typeof nothing {
-    const { patches } = this.editor.step;
+    const patches = this.editor.editable;
     if (patches.length < 2) {
       return nothing;
     }
@@ -258,3 +258,10 @@ export class ToolsPanel extends Panel {
 }
 
 customElements.define('darn-tools', ToolsPanel);
+
+/** Why no tool can be chosen. */
+function noTools(patches: number): string {
+  return patches === 0
+    ? 'Mend a hole to edit its new cloth.'
+    : 'The cloth around what is filled cannot be laid flat, so its new cloth takes no gestures.';
+}
