@@ -318,6 +318,11 @@ export interface paths {
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
+        /** @description What is wanted beside a scan's boundary loops. */
+        HolesQuery: {
+            /** @description Whether what a mesher has probably sealed is listed, too. */
+            suspects?: boolean;
+        };
         /** @description What a request asks for. Every part may be left out: then all holes are filled with the default weights. */
         Constraints: {
             /** @description The holes to fill; none given means all of them. A loop named here is tried whatever its kind, and the request is refused when it cannot be filled; of the others, those that cannot be filled are listed as skipped. */
@@ -347,15 +352,21 @@ export interface components {
             id?: number;
             /** @description A point `[x, y, z]`: the loop that comes nearest to it, whatever its kind; an outer boundary only when the scan has no other loop. */
             near?: number[];
-            /** @description Damaged cloth to cut out first. Not served by this version yet. */
+            /** @description Damaged cloth to cut out first; the holes that this leaves are then filled. */
             cut?: components["schemas"]["Cut"];
         };
-        /** @description A ball of cloth to cut out. */
+        /** @description Cloth to cut out, by exactly one of a ball (`center`, `radius`), a polygon (`polygon`, `depth`) and `loops`. The triangles leave the index lists of the scan's primitives; the bytes of the old lists stay, and `extras.darn.cuts` of each primitive says how to put them back. */
         Cut: {
-            /** @description Centre of the ball, `[x, y, z]`. */
+            /** @description Centre of a ball, `[x, y, z]`: every triangle that reaches into the ball is cut out. */
             center?: number[];
             /** @description Radius of the ball, in the scene's unit. */
             radius?: number;
+            /** @description Corners of a closed polygon on the cloth, `[x, y, z]` each: seen along the polygon's mean normal, every triangle that reaches into it is cut out, as far as `depth` says. */
+            polygon?: number[][];
+            /** @description How far a polygon's cut reaches to either side of its mean plane, in the scene's unit. */
+            depth?: number;
+            /** @description Loops whose damaged edge is cut out: every triangle that touches one of them. */
+            loops?: number[];
         };
         /** @description A point the new cloth should pass through. */
         Anchor: {
@@ -466,7 +477,7 @@ export interface components {
         };
         /** @description A boundary loop of the welded mesh. */
         Loop: {
-            /** @description Stable within a scan: the loops in order of their lowest vertex. */
+            /** @description Stable within a scan: the loops in order of their lowest vertex. A cut leaves these ids as they are: a hole that it enlarges keeps the lowest of those it takes up, and new holes are numbered on from the scan's last loop. */
             id?: number;
             /** @description What the loop is. */
             kind?: components["schemas"]["LoopKind"];
@@ -505,6 +516,15 @@ export interface components {
             notes?: string[];
             /** @description Milliseconds per stage. */
             timings?: components["schemas"]["ScanTimings"];
+            /** @description What was not taken as the file has it, by kind; the file itself keeps it. */
+            setAside?: components["schemas"]["SetAside"][];
+        };
+        /** @description What was not taken as the file has it when its loops were found. */
+        SetAside: {
+            /** @description Stable word for the kind: `degenerate_face` (no area), `duplicate_face` (the corners of another triangle), `fin` (a triangle on an edge that two others share more smoothly), `flipped_face` (facing the other way than its neighbours), `t_junction` (a border vertex that lies on the border edge of another triangle), `near_seam_vertex` (a border vertex beside another one, within the precision of the coordinates), `vertex_not_finite` (a vertex that no triangle uses). */
+            kind?: string;
+            /** @description How many there are. */
+            count?: number;
         };
         /** @description What Inpaint did. */
         Report: {
@@ -520,6 +540,8 @@ export interface components {
             timings?: components["schemas"]["ScanTimings"];
             /** @description What a person should know about this scan. */
             notes?: string[];
+            /** @description What was not taken as the file has it, by kind; the file itself keeps it. */
+            setAside?: components["schemas"]["SetAside"][];
         };
         /** @description A weights file. */
         Weights: {
@@ -554,6 +576,8 @@ export interface components {
             edits?: components["schemas"]["EditReport"][];
             /** @description Why the patch is no plausible cloth, each reason for a person; empty for a sound patch. Applied only when the request accepts doubtful patches. */
             doubts?: string[];
+            /** @description Triangles of the scan at the rim that are no part of the cloth's edge, such as spikes, threads and flaps. They stay in the file; the new cloth starts at the sound edge beneath them. */
+            leftFaces?: number;
         };
         /** @description How well the cloth around a hole lies flat. */
         ChartReport: {
@@ -866,7 +890,10 @@ export interface operations {
     };
     findHoles: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Whether what a mesher has probably sealed is listed, too, each with a cut that takes it out */
+                suspects?: boolean;
+            };
             header?: never;
             path?: never;
             cookie?: never;
@@ -882,7 +909,7 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Every boundary loop of the scan */
+            /** @description Every boundary loop of the scan, and what a mesher has probably sealed where that is asked for */
             200: {
                 headers: {
                     [name: string]: unknown;
