@@ -120,7 +120,8 @@ fn a_patch_is_plain_and_the_compressed_bytes_stay() {
             colors: Vec::new(),
             faces: vec![[0, 1, 2]],
             both_sides: false,
-            extras: json!({"reconstructed": true}),
+            hole: Default::default(),
+            method: Default::default(),
         };
         let out = scan.write(&[patch]).unwrap();
         let again = read(&out).unwrap();

@@ -54,7 +54,8 @@ fn patch() -> PatchPrimitive {
         colors: Vec::new(),
         faces: vec![[0, 1, 2]],
         both_sides: false,
-        extras: json!({"reconstructed": true}),
+        hole: Default::default(),
+        method: Default::default(),
     }
 }
 

@@ -15,6 +15,7 @@ mod accessor;
 mod append;
 mod attributes;
 mod buffers;
+mod checked_patch;
 mod compressed;
 #[cfg(test)]
 mod compressed_tests;
@@ -30,7 +31,9 @@ mod json;
 mod json_edit;
 mod left_out;
 mod limits;
+mod material_copy;
 mod pack;
+mod patch_group;
 mod patch_primitive;
 mod patch_skin;
 mod primitive;

@@ -1,9 +1,9 @@
 //! A patch as [`super::Scan::write`] takes it.
 
 use darn_geometry::mesh::Vec3;
-use serde_json::Value;
+use serde_json::{Map, Value};
 
-/// A patch to append to the scan as a primitive of its own.
+/// A patch to append to the scan. Patches of the same mesh, material and attributes share a primitive.
 ///
 /// Its attributes are those of the part whose material it takes: normals if that part has them, and as many texture
 /// coordinate and colour sets, each `[points.len()]`. On a skinned mesh its joints and weights come from the scan's
@@ -18,7 +18,7 @@ pub struct PatchPrimitive {
     pub points: Vec<PatchPoint>,
     /// Triangles over `points`, counter-clockwise in scene space.
     pub faces: Vec<[u32; 3]>,
-    /// Whether a second primitive shows the patch's other side, as in scans that store each piece of cloth as two
+    /// Whether another primitive shows the patch's other side, as in scans that store each piece of cloth as two
     /// layers of triangles.
     pub both_sides: bool,
     /// Normals in scene space, `[points.len()]`, of any length except zero; not read if the part has none.
@@ -27,10 +27,12 @@ pub struct PatchPrimitive {
     pub texcoords: Vec<Vec<[f32; 2]>>,
     /// Colour sets, linear RGBA.
     pub colors: Vec<Vec<[f32; 4]>>,
-    /// Name of the new accessors and buffer views.
+    /// Name of the new accessors and buffer views, if it has a primitive of its own.
     pub name: String,
-    /// What is recorded about the patch: `extras.darn` of its primitive.
-    pub extras: Value,
+    /// What is recorded about the patch alone: its entry of `holes` in `extras.darn` of its primitive.
+    pub hole: Map<String, Value>,
+    /// What is recorded about how it was made: members of the same `extras.darn`.
+    pub method: Map<String, Value>,
 }
 
 /// A vertex of a patch.

@@ -1,7 +1,7 @@
 //! Laws of writing patches. The `gltf` crate reads the results back as an independent check.
 
 use proptest::prelude::*;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::skin::Influence;
 use super::testing::Builder;
@@ -10,6 +10,13 @@ use darn_geometry::mesh::Vec3;
 
 fn read(bytes: &[u8]) -> Scan {
     Scan::read(bytes.to_vec(), &ScanLimits::default()).unwrap()
+}
+
+fn object(value: Value) -> Map<String, Value> {
+    let Value::Object(object) = value else {
+        panic!("{value} is no object")
+    };
+    object
 }
 
 /// A tent over the first three vertices of a part: one new point, three triangles.
@@ -27,7 +34,8 @@ fn tent(scan: &Scan, part: usize, top: Vec3) -> PatchPrimitive {
         texcoords: vec![vec![[0.25, 0.5]; 4]; look.texcoords.len()],
         colors: vec![vec![[0.1, 0.2, 0.3, 0.4]; 4]; look.colors.len()],
         name: "hole 0".into(),
-        extras: json!({"reconstructed": true, "hole": 0}),
+        hole: object(json!({"id": 0})),
+        method: object(json!({"weights": {"name": "standard"}})),
     }
 }
 
@@ -141,7 +149,7 @@ fn everything_in_the_scan_stays() {
     );
     assert_eq!(new["meshes"][0]["primitives"][1]["material"], 1);
     assert_eq!(
-        new["meshes"][0]["primitives"][1]["extras"]["darn"]["hole"],
+        new["meshes"][0]["primitives"][1]["extras"]["darn"]["holes"][0]["id"],
         0
     );
 }
@@ -337,6 +345,77 @@ fn only_patches_of_skinned_meshes_have_joints() {
     let (json, _) = parsed(&scan.write(&[tent(&scan, 0, Vec3::z())]).unwrap());
     let attributes = &json["meshes"][0]["primitives"][1]["attributes"];
     assert_eq!(attributes.as_object().unwrap().len(), 1);
+}
+
+#[test]
+fn patches_of_a_mesh_and_material_share_a_primitive_and_keep_their_ranges() {
+    let tents = |scan: &Scan| {
+        let mut third = tent(scan, 0, Vec3::x());
+        third.both_sides = true;
+        let numbered = [tent(scan, 0, Vec3::z()), third, tent(scan, 0, -Vec3::z())].into_iter();
+        let numbered = (0..).zip(numbered).map(|(id, mut tent)| {
+            tent.hole.insert("id".into(), json!(id));
+            tent
+        });
+        numbered.collect::<Vec<_>>()
+    };
+    for (builder, mirrors) in [(Builder::square(), false), (Builder::skinned(), true)] {
+        let scan = read(&builder.glb());
+        let tents = tents(&scan);
+        let out = scan.write(&tents).unwrap();
+        let again = read(&out);
+        // Both sides of hole 1 are a pair of their own.
+        assert_eq!(again.parts.len(), 4);
+        let (json, _) = parsed(&out);
+        let record =
+            |primitive: usize| &json["meshes"][0]["primitives"][primitive]["extras"]["darn"];
+        let darn = record(1);
+        assert_eq!(darn["reconstructed"], true);
+        assert_eq!(darn["weights"]["name"], "standard");
+        let ids = |primitive: usize| -> Vec<u64> {
+            let holes = record(primitive)["holes"].as_array().unwrap();
+            holes
+                .iter()
+                .map(|hole| hole["id"].as_u64().unwrap())
+                .collect()
+        };
+        assert_eq!([ids(1), ids(2), ids(3)], [vec![0, 2], vec![1], vec![1]]);
+        for hole in darn["holes"].as_array().unwrap() {
+            let number = |key: &str| hole[key].as_u64().unwrap() as usize;
+            let tent = &tents[number("id")];
+            let part = &again.parts[1];
+            let first = part.faces.start as usize + number("firstIndex") / 3;
+            let faces = &again.surface.faces[first..][..number("indexCount") / 3];
+            let base = part.vertices.start + number("firstVertex") as u32;
+            let own: Vec<[u32; 3]> = faces.iter().map(|f| f.map(|v| v - base)).collect();
+            // The reader turns mirrored faces as the writer does, and starts them with the same vertex.
+            assert_eq!(own, tent.faces, "mirrors: {mirrors}");
+            let PatchPoint::New(top) = tent.points[3] else {
+                unreachable!()
+            };
+            let found = again.surface.positions[base as usize + 3];
+            assert!((found - top).norm() < 1e-6, "{found} {top}");
+            assert_eq!(number("vertexCount"), tent.points.len());
+        }
+        let (positions, indices) = read_by_gltf(&out);
+        assert_eq!((positions.len(), indices.len()), (4, 9));
+    }
+}
+
+#[test]
+fn patches_of_many_vertices_have_wide_indices() {
+    let scan = read(&Builder::square().glb());
+    let mut wide = tent(&scan, 0, Vec3::z());
+    let more = 40_000;
+    wide.points.extend(vec![PatchPoint::New(Vec3::y()); more]);
+    wide.normals.extend(vec![Vec3::z(); more]);
+    let out = scan.write(&[wide.clone(), wide]).unwrap();
+    let again = read(&out);
+    assert_eq!(again.parts[1].vertices.len(), 2 * (more + 4));
+    let faces = again.parts[1].faces.clone();
+    let last = again.surface.faces[faces.end as usize - 1];
+    let base = again.parts[1].vertices.start + more as u32 + 4;
+    assert_eq!(last, [2, 0, 3].map(|v| base + v));
 }
 
 #[test]

@@ -3,9 +3,8 @@
 use std::collections::BTreeMap;
 
 use darn_budget::{Budget, Exhausted};
-use serde_json::json;
+use serde_json::{Map, Value, json};
 
-use crate::VERSION;
 use crate::hole_report::FilledHole;
 use crate::near_seams::{RegionSources, meet_both_sides};
 use crate::welded_scan::{SourceFace, WeldedScan};
@@ -157,7 +156,8 @@ impl PatchSource<'_> {
             texcoords: texcoords.collect(),
             colors: colors.collect(),
             name: format!("darn reconstruction of hole {}", report.id),
-            extras: provenance(report, card),
+            hole: hole_record(report),
+            method: method_record(report, card),
         })
     }
 }
@@ -211,33 +211,38 @@ fn normals(patch: &Patch, region: &Region) -> Vec<Vec3> {
     rim.chain(all[inner..].iter().copied()).map(solid).collect()
 }
 
-/// `extras.darn` of a patch: that it is reconstructed, by which version and weights, and its numbers. No timings, as
-/// the same input gives the same bytes.
-fn provenance(report: &v1::HoleReport, card: &WeightsCard) -> serde_json::Value {
+/// What a patch's primitive records about the hole: its id and its numbers. No timings, as the same input gives the
+/// same bytes.
+fn hole_record(report: &v1::HoleReport) -> Map<String, Value> {
     let patch = report.patch.clone().unwrap_or_default();
-    let mut said = json!({
-        "reconstructed": true,
-        "hole": report.id,
-        "version": VERSION,
-        "weights": { "name": card.name, "sha256": card.sha256 },
-        "anchors": report.anchors.len(),
-        "edits": report.edits.len(),
-        "refinement": patch.refinement,
-        "chart": (report.chart)
-            .map(|c| json!({ "stretchMean": c.stretch_mean, "stretchMax": c.stretch_max })),
-        "patch": {
-            "area": patch.area,
-            "stretchMean": patch.stretch_mean,
-            "stretchMax": patch.stretch_max,
-            "gaussianCurvature": patch.gaussian_curvature,
-            "selfIntersections": patch.self_intersections,
-        },
-    });
-    // Without a chart there is no network in the patch either.
-    if let (None, Some(said)) = (report.chart, said.as_object_mut()) {
-        said.insert("method".to_owned(), json!(patch.method));
-        said.remove("chart");
-        said.remove("weights");
+    let mut said = Map::new();
+    said.insert("id".into(), json!(report.id));
+    said.insert("anchors".into(), json!(report.anchors.len()));
+    said.insert("edits".into(), json!(report.edits.len()));
+    said.insert("refinement".into(), json!(patch.refinement));
+    match report.chart {
+        Some(c) => {
+            let chart = json!({ "stretchMean": c.stretch_mean, "stretchMax": c.stretch_max });
+            said.insert("chart".into(), chart);
+        }
+        None => {
+            said.insert("method".into(), json!(patch.method));
+        }
     }
+    let numbers = json!({
+        "area": patch.area,
+        "stretchMean": patch.stretch_mean,
+        "stretchMax": patch.stretch_max,
+        "gaussianCurvature": patch.gaussian_curvature,
+        "selfIntersections": patch.self_intersections,
+    });
+    said.insert("patch".into(), numbers);
     said
+}
+
+/// What it records about how its holes were filled: by which weights. Without a chart there is no network in a patch.
+fn method_record(report: &v1::HoleReport, card: &WeightsCard) -> Map<String, Value> {
+    let weights = json!({ "name": card.name, "sha256": card.sha256 });
+    let weights = report.chart.map(|_| ("weights".to_owned(), weights));
+    weights.into_iter().collect()
 }

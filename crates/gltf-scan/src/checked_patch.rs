@@ -1,0 +1,191 @@
+//! A patch checked against the scan that takes it.
+
+use super::error::ScanError;
+use super::patch_primitive::{PatchPoint, PatchPrimitive};
+use super::patch_skin::patch_influences;
+use super::scan::{Scan, ScanPart};
+use super::skin::Influence;
+use darn_geometry::mesh::Vec3;
+
+/// How far the squared length of a stored normal may be from 1; the glTF validator allows about half of it.
+const UNIT: f32 = 1e-3;
+
+/// A patch that has been checked against the scan.
+pub(super) struct CheckedPatch<'s> {
+    pub patch: &'s PatchPrimitive,
+    /// The part whose mesh and node take the patch.
+    pub home: &'s ScanPart,
+    /// The part whose material and attributes the patch takes.
+    pub look: &'s ScanPart,
+    /// Positions in the node's space.
+    pub points: Vec<[f32; 3]>,
+    /// Sets of joints and weights; none if the mesh has no skin.
+    pub skinning: Vec<Vec<Influence>>,
+}
+
+/// What patches must have in common to share a primitive: where they are, how they look, and their attributes.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct PatchKind {
+    node: usize,
+    mesh: usize,
+    material: Option<usize>,
+    both_sides: bool,
+    normals: bool,
+    texcoords: usize,
+    /// Channels of each colour set.
+    colors: Vec<usize>,
+    /// Sets of joints and weights.
+    influences: usize,
+    targets: usize,
+}
+
+impl<'s> CheckedPatch<'s> {
+    /// Checks a patch, the `index`-th of those to write.
+    pub fn new(scan: &'s Scan, patch: &'s PatchPrimitive, index: usize) -> Result<Self, ScanError> {
+        let fail = |detail: String| ScanError::InvalidPatch {
+            patch: index,
+            detail,
+        };
+        let part = |at: usize| {
+            scan.parts
+                .get(at)
+                .ok_or_else(|| fail(format!("there is no part {at}")))
+        };
+        let (home, look) = (part(patch.part)?, part(patch.material_of)?);
+        check_values(patch, look).map_err(fail)?;
+        let inverse = home.transform.inverse();
+        let mut points = Vec::with_capacity(patch.points.len());
+        for (k, point) in patch.points.iter().enumerate() {
+            let local = match *point {
+                PatchPoint::Scan(vertex) => stored_on(scan, home, vertex),
+                PatchPoint::New(_) => None,
+            };
+            if let Some(local) = local {
+                points.push(local);
+                continue;
+            }
+            let in_scene = match *point {
+                PatchPoint::New(point) => point,
+                PatchPoint::Scan(vertex) => {
+                    let position = scan.surface.positions.get(vertex as usize);
+                    *position.ok_or_else(|| {
+                        fail(format!(
+                            "point {k} is vertex {vertex}, which the scan does not have"
+                        ))
+                    })?
+                }
+            };
+            let inverse = inverse
+                .as_ref()
+                .ok_or(ScanError::Singular { node: home.node })?;
+            let local: [f32; 3] = inverse.point(in_scene).map(|x| x as f32).into();
+            if !local.iter().all(|x| x.is_finite()) {
+                return Err(fail(format!(
+                    "point {k} is not finite in the space of node {}",
+                    home.node
+                )));
+            }
+            points.push(local);
+        }
+        let skinning = match home.skinning {
+            Some(_) => patch_influences(scan, home, &patch.points, &points),
+            None => Vec::new(),
+        };
+        Ok(Self {
+            patch,
+            home,
+            look,
+            points,
+            skinning,
+        })
+    }
+
+    /// What patches must have in common to share a primitive.
+    pub fn kind(&self) -> PatchKind {
+        let kinds = self.look.color_kinds.iter();
+        PatchKind {
+            node: self.home.node,
+            mesh: self.home.mesh,
+            material: self.look.material,
+            both_sides: self.patch.both_sides,
+            normals: self.look.normals.is_some(),
+            texcoords: self.patch.texcoords.len(),
+            colors: kinds.map(|kind| kind.multiplicity()).collect(),
+            influences: self.skinning.len(),
+            targets: self.home.targets,
+        }
+    }
+
+    /// Unit normals in the node's space: the transpose of its linear part, since renderers apply the inverse transpose.
+    /// The scan's own vertices keep their stored normals, so that the shading has no seam between patch and scan.
+    pub fn normals(&self) -> Vec<[f32; 3]> {
+        let to_node = self.home.transform.linear.transpose();
+        let unit = |normal: &Vec3| {
+            (to_node * normal)
+                .try_normalize(f64::MIN_POSITIVE)
+                .unwrap_or_else(Vec3::z)
+        };
+        (self.patch.points.iter())
+            .zip(&self.patch.normals)
+            .map(|(point, normal)| {
+                self.stored_normal(point)
+                    .unwrap_or_else(|| unit(normal).map(|x| x as f32).into())
+            })
+            .collect()
+    }
+
+    /// The scan's normal at a patch point that is a vertex of `look`, if it has unit length.
+    fn stored_normal(&self, point: &PatchPoint) -> Option<[f32; 3]> {
+        let PatchPoint::Scan(vertex) = *point else {
+            return None;
+        };
+        let at = vertex.checked_sub(self.look.vertices.start)? as usize;
+        let stored = *self.look.normals.as_ref()?.get(at)?;
+        let unit = (stored.iter().map(|x| x * x).sum::<f32>() - 1.0).abs() < UNIT;
+        (self.look.node == self.home.node && unit).then_some(stored)
+    }
+}
+
+/// Checks that a patch has faces over its points, and finite attributes, as many as the part whose look it takes.
+fn check_values(patch: &PatchPrimitive, look: &ScanPart) -> Result<(), String> {
+    let n = patch.points.len();
+    if patch.faces.is_empty() || u32::try_from(n).is_err() {
+        return Err(format!("{} faces over {n} points", patch.faces.len()));
+    }
+    let outside = |face: &&[u32; 3]| face.iter().any(|v| *v as usize >= n);
+    if let Some(face) = patch.faces.iter().find(outside) {
+        return Err(format!("face {face:?} goes past the {n} points"));
+    }
+    if look.normals.is_some() {
+        expect_count(patch.normals.len(), n, "normals")?;
+    }
+    let sets = patch.texcoords.len();
+    expect_count(sets, look.texcoords.len(), "texture coordinate sets")?;
+    expect_count(patch.colors.len(), look.colors.len(), "colour sets")?;
+    for set in &patch.texcoords {
+        expect_count(set.len(), n, "texture coordinates")?;
+    }
+    for set in &patch.colors {
+        expect_count(set.len(), n, "colours")?;
+    }
+    let mut texcoords = patch.texcoords.iter().flatten().flatten();
+    let mut colors = patch.colors.iter().flatten().flatten();
+    if !(texcoords.all(|x| x.is_finite()) && colors.all(|x| x.is_finite())) {
+        return Err("a texture coordinate or colour is not finite".into());
+    }
+    Ok(())
+}
+
+/// The stored position of a vertex of the surface that belongs to the home's node; such positions are finite.
+fn stored_on(scan: &Scan, home: &ScanPart, vertex: u32) -> Option<[f32; 3]> {
+    let (node, local) = scan.stored_position(vertex)?;
+    (node == home.node).then_some(local)
+}
+
+fn expect_count(found: usize, wanted: usize, what: &str) -> Result<(), String> {
+    if found == wanted {
+        Ok(())
+    } else {
+        Err(format!("{found} {what}, where {wanted} are wanted"))
+    }
+}
