@@ -25,6 +25,7 @@ mod samples;
 #[cfg(feature = "burn")]
 mod scarffolds;
 mod serve;
+mod strip;
 #[cfg(feature = "burn")]
 mod train;
 
@@ -52,6 +53,8 @@ enum CliCommand {
     Serve(ServeCommand),
     /// Fill the holes of a scan
     Inpaint(inpaint::InpaintArgs),
+    /// Take everything out of a scan that darn put in
+    Strip(strip::StripArgs),
     /// Search where on a hole's chart a point in space belongs
     OptimizeAnchor(optimize_anchor::OptimizeAnchorArgs),
     /// List the boundary loops of a scan: its holes, its border, the ends of its sleeves
@@ -112,6 +115,7 @@ fn run(command: CliCommand) -> Result<(), Failure> {
     match command {
         CliCommand::Serve(settings) => serve::run(&settings),
         CliCommand::Inpaint(args) => inpaint::run(&args),
+        CliCommand::Strip(args) => strip::run(&args),
         CliCommand::OptimizeAnchor(args) => optimize_anchor::run(&args),
         CliCommand::Holes(args) => holes::run(&args),
         CliCommand::Render(args) => render::run(&args),

@@ -11,7 +11,9 @@ use std::{
 
 use axum::body::Bytes;
 use darn_budget::Budget;
-use darn_contract::port::{EditSession, HolesQuery, Mended, Mender, PatchForm, Patches, Refusal};
+use darn_contract::port::{
+    EditSession, HolesQuery, Mended, Mender, PatchForm, Patches, Refusal, ScanForm, Stripped,
+};
 use darn_contract::{Anchor, Code, Constraints, FieldError, Search, codes, v1};
 use serde_json::{Value, json};
 
@@ -155,8 +157,11 @@ impl From<Behaviour> for FakeScan {
     }
 }
 
+/// What a mend puts in front of a scan.
+const MENDED: &[u8] = b"glTF ";
+
 fn mended(scan: &[u8]) -> Vec<u8> {
-    [b"glTF ", scan].concat()
+    [MENDED, scan].concat()
 }
 
 /// Mends nothing; behaves as scans and tests say.
@@ -391,6 +396,23 @@ impl Mender for FakeMender {
             bytes: mended(&scan),
             media_type: "model/gltf-binary",
             report: report(constraints),
+        })
+    }
+
+    /// Takes away what [`mended`] put in front; other scans have nothing to strip.
+    fn strip(&self, scan: Bytes, _: ScanForm, _: &Budget<'_>) -> Result<Stripped, Refusal> {
+        self.act_on_scan(&scan)?;
+        let Some(bytes) = scan.strip_prefix(MENDED) else {
+            return Err(Refusal::new(codes::NOTHING_TO_STRIP, "nothing of darn's"));
+        };
+        Ok(Stripped {
+            bytes: bytes.to_vec(),
+            media_type: "model/gltf-binary",
+            report: v1::StripReport {
+                exact: !bytes.ends_with(b"!"),
+                patches: 1,
+                ..Default::default()
+            },
         })
     }
 

@@ -13,4 +13,5 @@ mod peers;
 mod protocols;
 mod sessions;
 mod signals;
+mod strip;
 mod uploads;

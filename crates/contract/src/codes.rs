@@ -156,6 +156,8 @@ codes! {
     ANSWER_TOO_LARGE = "answer_too_large", 422, FailedPrecondition;
     /// The scan has no hole to fill.
     NO_HOLES = "no_holes", 422, FailedPrecondition;
+    /// The scan has nothing of darn's that could be taken out.
+    NOTHING_TO_STRIP = "nothing_to_strip", 422, FailedPrecondition;
     /// More holes than are filled at once.
     TOO_MANY_HOLES = "too_many_holes", 422, FailedPrecondition;
     /// The hole's rim runs through an edge that more than two triangles share.

@@ -25,6 +25,17 @@ pub struct Mended {
     pub report: v1::Report,
 }
 
+/// A scan without what darn put in, and the report.
+#[derive(Debug, Clone)]
+pub struct Stripped {
+    /// The glTF, in the container of the input or the form asked for.
+    pub bytes: Vec<u8>,
+    /// The media type of that container.
+    pub media_type: &'static str,
+    /// What was taken out.
+    pub report: v1::StripReport,
+}
+
 /// Mends scans. Called from many worker threads at once; every call blocks until it is done, or until its budget is exhausted: a mender
 /// asks it in every loop whose length the input decides, and after a cancellation it returns any refusal, which nobody reads. `scan` holds the bytes of a GLB, or of a
 /// glTF JSON with data URIs, or of a zip with a glTF and its files; they are shared with the request, not copied.
@@ -52,6 +63,12 @@ pub trait Mender: Send + Sync + 'static {
     ) -> Result<Mended, Refusal> {
         Ok(mended)
     }
+
+    /// Takes everything out of a scan that a mend put in.
+    ///
+    /// # Errors
+    /// The scan is not readable, or has nothing to take out; `Exhausted`.
+    fn strip(&self, scan: Bytes, form: ScanForm, budget: &Budget<'_>) -> Result<Stripped, Refusal>;
 
     /// Searches the uv of a hole's grid at which an anchor takes the cloth closest to a point in scene space.
     ///

@@ -9,10 +9,11 @@ use serde_json::{Value, json};
 
 use super::buffers::BufferTarget;
 use super::compressed::meshopt;
-use super::container::{Container, pack_glb};
+use super::container::{Container, pack_glb, too_long};
 use super::error::ScanError;
 use super::json_edit::JsonEdit;
 use super::scan::Scan;
+use super::undo;
 
 /// What to append to a scan: elements of lists in its JSON, and bytes.
 pub(super) struct Appender<'s> {
@@ -173,10 +174,6 @@ impl<'s> Appender<'s> {
 
     /// The whole scan, in the container it was read from.
     pub fn finish(mut self) -> Result<Vec<u8>, ScanError> {
-        let too_long = |length: usize| ScanError::Container {
-            offset: length,
-            detail: "the patched scan would exceed the 4 GiB of a GLB".into(),
-        };
         let length = self.start + self.data.len();
         let (bytes, layout) = (&self.scan.bytes, &self.scan.layout);
         let mut edit = JsonEdit::new(bytes.get(layout.json.clone()).unwrap_or_default())?;
@@ -191,6 +188,7 @@ impl<'s> Appender<'s> {
             self.lists.remove("buffers");
             edit.replace(&["buffers", "0", "byteLength"], &json!(length))?;
         }
+        self.extras_of_last("bufferViews", undo::extras());
         for (path, value) in &self.members {
             let path: Vec<&str> = path.iter().map(String::as_str).collect();
             edit.set(&path, value)?;
@@ -201,9 +199,10 @@ impl<'s> Appender<'s> {
         for (key, values) in &self.lists {
             edit.append(&[key], values)?;
         }
-        let text = edit.finish().into_bytes();
+        let text = undo::with_record(self.scan, edit.finish())?.into_bytes();
         if layout.container == Container::Gltf {
-            return Ok(text);
+            let head = bytes.get(..layout.json.start).unwrap_or_default();
+            return Ok([head, &text].concat());
         }
         let old = layout.bin.clone().and_then(|range| bytes.get(range));
         let bin = if self.in_bin {

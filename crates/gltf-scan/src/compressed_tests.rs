@@ -9,7 +9,7 @@ use meshoptimizer_rs::codec::{VertexEncoding, encode_vertex_buffer};
 use serde_json::{Value, json};
 
 use super::compressed::encoded::{Coding, PlainMesh, glb};
-use super::{PatchPoint, PatchPrimitive, Scan, ScanError, ScanLimits};
+use super::{PatchPoint, PatchPrimitive, Scan, ScanError, ScanLimits, stripped};
 
 /// Waved cloth of 14 × 14 vertices with a hole.
 fn cloth() -> PlainMesh {
@@ -124,6 +124,8 @@ fn a_patch_is_plain_and_the_compressed_bytes_stay() {
             method: Default::default(),
         };
         let out = scan.write(&[patch]).unwrap();
+        let stripped = stripped(out.clone(), &ScanLimits::default(), Budget::unlimited());
+        assert!(stripped.unwrap().unwrap().bytes == bytes, "{coding:?}");
         let again = read(&out).unwrap();
         let added = &again.parts[1];
         let start = added.vertices.start as usize;

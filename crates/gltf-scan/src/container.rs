@@ -149,33 +149,71 @@ fn word(bytes: &[u8], at: usize) -> Option<u32> {
         .map(|word| u32::from_le_bytes(*word))
 }
 
+/// The length of the JSON chunk of a GLB, padding included.
+pub(super) fn json_chunk_length(bytes: &[u8]) -> Option<usize> {
+    word(bytes, HEADER).map(|length| length as usize)
+}
+
+/// The error of a GLB that would be longer than the format can say.
+pub(super) fn too_long(length: usize) -> ScanError {
+    ScanError::Container {
+        offset: length,
+        detail: "the scan would exceed the 4 GiB of a GLB".into(),
+    }
+}
+
 /// Packs a GLB: JSON padded with spaces, BIN padded with zeros, then `rest`, whole chunks. What comes after the GLB is not
 /// part of it.
 ///
 /// Returns `None` if the whole would not fit the format's 32-bit lengths.
 pub(super) fn pack_glb(json: &[u8], bin: Option<&[u8]>, rest: &[u8]) -> Option<Vec<u8>> {
-    let padded = |n: usize| n.next_multiple_of(4);
-    let total = HEADER
-        + CHUNK_HEADER
-        + padded(json.len())
-        + bin.map_or(0, |bin| CHUNK_HEADER + padded(bin.len()))
-        + rest.len();
+    let chunk = |body, fill| Chunk {
+        body,
+        length: <[u8]>::len(body).next_multiple_of(4),
+        fill,
+    };
+    packed(chunk(json, b' '), bin.map(|bin| chunk(bin, 0)), rest)
+}
+
+/// A GLB of chunks that bring their own padding, if any.
+///
+/// Returns `None` as [`pack_glb`].
+pub(super) fn glb_of_chunks(json: &[u8], bin: Option<&[u8]>, rest: &[u8]) -> Option<Vec<u8>> {
+    let chunk = |body| Chunk {
+        body,
+        length: <[u8]>::len(body),
+        fill: 0,
+    };
+    packed(chunk(json), bin.map(chunk), rest)
+}
+
+/// A chunk to write.
+struct Chunk<'c> {
+    body: &'c [u8],
+    /// Its length, padding included.
+    length: usize,
+    /// The byte to pad it with.
+    fill: u8,
+}
+
+fn packed(json: Chunk<'_>, bin: Option<Chunk<'_>>, rest: &[u8]) -> Option<Vec<u8>> {
+    let bin_length = bin.as_ref().map_or(0, |bin| CHUNK_HEADER + bin.length);
+    let total = HEADER + CHUNK_HEADER + json.length + bin_length + rest.len();
     let total = u32::try_from(total).ok()?;
     let mut out = Vec::with_capacity(total as usize);
     out.extend_from_slice(MAGIC);
     out.extend_from_slice(&2u32.to_le_bytes());
     out.extend_from_slice(&total.to_le_bytes());
-    let mut push = |kind: u32, body: &[u8], fill: u8| {
-        let length = padded(body.len());
+    let mut push = |kind: u32, chunk: Chunk<'_>| {
         // The cast is lossless: the length is part of `total`, which is a u32.
-        out.extend_from_slice(&(length as u32).to_le_bytes());
+        out.extend_from_slice(&(chunk.length as u32).to_le_bytes());
         out.extend_from_slice(&kind.to_le_bytes());
-        out.extend_from_slice(body);
-        out.resize(out.len() + length - body.len(), fill);
+        out.extend_from_slice(chunk.body);
+        out.resize(out.len() + chunk.length - chunk.body.len(), chunk.fill);
     };
-    push(JSON_CHUNK, json, b' ');
+    push(JSON_CHUNK, json);
     if let Some(bin) = bin {
-        push(BIN_CHUNK, bin, 0);
+        push(BIN_CHUNK, bin);
     }
     out.extend_from_slice(rest);
     Some(out)

@@ -2,7 +2,7 @@
 //!
 //! A primitive of which triangles are cut out gets a new list of triangles; its vertices, attributes, morph targets and
 //! the bytes of its old indices stay. Each cut is recorded in its `extras.darn.cuts`, oldest first: what `indices` and
-//! `mode` were before (null: left out) and how many triangles went. With the members of an entry put back, that cut and
+//! `mode` were before (null: left out), the `count` of the old list, and how many triangles are left. With the members of an entry put back, that cut and
 //! all later ones are undone. Extras that are not an object cannot take the record; the new accessor's extras have it
 //! then.
 
@@ -128,11 +128,18 @@ fn cut_primitive(scan: &Scan, part: &ScanPart, out: &mut Appender<'_>) -> Result
     // An accessor has at least one element; a triangle without extent draws nothing.
     let none = faces.is_empty().then_some([0; 3]);
     let (component, bytes) = index_bytes(local.chain(none), part.vertices.len());
-    let record = json!({
+    let mut record = json!({
         "indices": member("indices"),
         "mode": member("mode"),
         "trianglesLeft": faces.len(),
     });
+    let old = member("indices");
+    let old = old
+        .as_u64()
+        .map(|index| format!("/accessors/{index}/count"));
+    if let Some(count) = old.and_then(|count| scan.json.pointer(&count)) {
+        record["count"] = count.clone();
+    }
     let indices = out.accessor(AccessorData {
         name: "darn cut",
         target: BufferTarget::Indices,

@@ -26,6 +26,23 @@ pub(super) struct JsonEdit<'t> {
     children: HashMap<usize, Children<'t>>,
 }
 
+/// An edited text, and how it came about.
+pub(super) struct EditedText {
+    pub text: String,
+    /// The edits, in order.
+    pub splices: Vec<Splice>,
+}
+
+/// One edit of a text.
+pub(super) struct Splice {
+    /// Where in the old text, in bytes.
+    pub at: usize,
+    /// The text that was there.
+    pub removed: String,
+    /// How many bytes came in its place.
+    pub inserted: usize,
+}
+
 /// The texts of a value's children.
 enum Children<'t> {
     Items(Vec<&'t RawValue>),
@@ -102,8 +119,23 @@ impl<'t> JsonEdit<'t> {
         Ok(())
     }
 
+    /// How many elements the array at `path` has; `None` if it is missing.
+    pub fn length(&mut self, path: &[&str]) -> Result<Option<usize>, ScanError> {
+        let Some(array) = self.find(path)? else {
+            return Ok(None);
+        };
+        let items: Vec<&RawValue> =
+            serde_json::from_str(array).map_err(|_| invalid(path, "must be an array"))?;
+        Ok(Some(items.len()))
+    }
+
+    /// Where in the text the value at `path` is; `None` if it is missing.
+    pub fn place(&mut self, path: &[&str]) -> Result<Option<Range<usize>>, ScanError> {
+        Ok(self.find(path)?.map(|value| self.span(value)))
+    }
+
     /// The edited text.
-    pub fn finish(mut self) -> String {
+    pub fn finish(mut self) -> EditedText {
         let close = self.span(self.root).end.saturating_sub(1);
         self.edits
             .push((close..close, std::mem::take(&mut self.members)));
@@ -112,13 +144,22 @@ impl<'t> JsonEdit<'t> {
             self.text.len() + self.edits.iter().map(|(_, new)| new.len()).sum::<usize>(),
         );
         let mut at = 0;
+        let mut splices = Vec::with_capacity(self.edits.len());
         for (range, new) in &self.edits {
             out.push_str(self.text.get(at..range.start).unwrap_or_default());
             out.push_str(new);
             at = range.end;
+            let removed = self.text.get(range.clone()).unwrap_or_default();
+            if !(new.is_empty() && removed.is_empty()) {
+                splices.push(Splice {
+                    at: range.start,
+                    removed: removed.to_owned(),
+                    inserted: new.len(),
+                });
+            }
         }
         out.push_str(self.text.get(at..).unwrap_or_default());
-        out
+        EditedText { text: out, splices }
     }
 
     /// The text of the value at `path` (keys and array indices).
@@ -184,7 +225,7 @@ mod tests {
         edit.replace(&["bb", "0", "n"], &json!(8)).unwrap();
         edit.append(&["new"], &[json!(6)]).unwrap();
         assert_eq!(
-            edit.finish(),
+            edit.finish().text,
             " { \"a\" : [ 1E5 , 2 ,3,{\"x\":4}] ,\n\"b\":{\"c\": [5],\"n\":1.0} , \"\\u0062\\u0062\":[{\"n\" :8}] ,\"new\":[6]} "
         );
     }
@@ -199,7 +240,7 @@ mod tests {
         edit.set(&["b", "m"], &json!({})).unwrap();
         assert!(edit.set(&["c", "m"], &json!({})).is_err());
         assert_eq!(
-            edit.finish(),
+            edit.finish().text,
             "{ \"a\" : { \"x\":1,\"y\\\"\":[2]} , \"b\":{\"n\":3 ,\"m\":{}}}"
         );
     }

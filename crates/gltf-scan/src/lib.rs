@@ -43,13 +43,19 @@ mod read_tests;
 mod scan;
 mod scene;
 mod skin;
+mod strip;
+#[cfg(test)]
+mod strip_tests;
 #[cfg(test)]
 pub(crate) mod testing;
 mod triangles;
+mod undo;
+mod unmarked;
 mod write;
 #[cfg(test)]
 mod write_tests;
 mod zip_files;
+mod zip_undo;
 
 pub use container::Container;
 pub use content::SceneContent;
@@ -60,3 +66,5 @@ pub use limits::ScanLimits;
 pub use pack::repacked;
 pub use patch_primitive::{PatchPoint, PatchPrimitive};
 pub use scan::{Scan, ScanPart};
+pub use strip::{Stripped, stripped};
+pub use unmarked::Marks;

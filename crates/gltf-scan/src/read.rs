@@ -13,6 +13,7 @@ use super::accessor::{Accessor, is_unsigned};
 use super::attributes::AttributeReader;
 use super::buffers::Document;
 use super::compressed::DecodeAllowance;
+use super::container::ContainerLayout;
 use super::content::SceneContent;
 use super::error::ScanError;
 use super::files::{Companions, Siblings};
@@ -98,19 +99,7 @@ fn read_files(
 ) -> Result<Scan, ScanError> {
     let (limits, budget) = (allowance.limits, allowance.budget);
     let layout = super::container::layout(&bytes)?;
-    let text = bytes.get(layout.json.clone()).unwrap_or_default();
-    let limit = Limit {
-        name: "max_json_values",
-        allowed: limits.max_json_values,
-    };
-    let values = values_at_most(text);
-    limit.check(values, "")?;
-    budget.hold(JSON_VALUE * values)?;
-    budget.spend(VALUE_WORK * values as u64)?;
-    let json = darn_json::value(text).map_err(|error| ScanError::Container {
-        offset: layout.json.start + offset_of(text, error.line(), error.column()),
-        detail: format!("the JSON does not parse: {error}"),
-    })?;
+    let json = parsed_json(&bytes, &layout, limits, budget)?;
     let root = JsonPlace::root(&json);
     check_version(&root)?;
     let bin = layout.bin.clone().and_then(|range| bytes.get(range));
@@ -158,6 +147,31 @@ fn read_files(
     budget.hold(scan.unpacked_bytes())?;
     budget.hold(scan.decoded_bytes())?;
     Ok(scan)
+}
+
+/// The JSON of a glTF.
+///
+/// # Errors
+/// It does not parse, or has more values than the limit; `Exhausted`.
+pub(super) fn parsed_json(
+    bytes: &[u8],
+    layout: &ContainerLayout,
+    limits: &ScanLimits,
+    budget: &Budget<'_>,
+) -> Result<Value, ScanError> {
+    let text = bytes.get(layout.json.clone()).unwrap_or_default();
+    let limit = Limit {
+        name: "max_json_values",
+        allowed: limits.max_json_values,
+    };
+    let values = values_at_most(text);
+    limit.check(values, "")?;
+    budget.hold(JSON_VALUE * values)?;
+    budget.spend(VALUE_WORK * values as u64)?;
+    darn_json::value(text).map_err(|error| ScanError::Container {
+        offset: layout.json.start + offset_of(text, error.line(), error.column()),
+        detail: format!("the JSON does not parse: {error}"),
+    })
 }
 
 fn check_version(root: &JsonPlace<'_>) -> Result<(), ScanError> {

@@ -1,6 +1,7 @@
 //! A zip with a glTF and its files: entries are read when they are needed, and copied as they are into the mended zip.
 
 use std::io::{Cursor, Read, Write};
+use std::ops::Range;
 
 use bytes::Bytes;
 use zip::result::ZipError;
@@ -10,12 +11,16 @@ use zip::{CompressionMethod, ZipArchive, ZipWriter};
 use super::compressed::DecodeAllowance;
 use super::error::ScanError;
 use super::files::relative;
+use super::zip_undo;
 
 /// The first bytes of a zip.
 pub(super) const MAGIC: &[u8] = b"PK\x03\x04";
 
 /// The first bytes of an entry's header in the central directory.
 const ENTRY_MAGIC: &[u8] = b"PK\x01\x02";
+/// Names of the entries that undo mends, with a number between.
+const UNDO_NAME: &str = "darn-undo-";
+const UNDO_ENDING: &str = ".bin";
 /// Most entries of a zip.
 const MAX_ENTRIES: usize = 10_000;
 /// Most bytes that a byte of an entry unpacks to: floats compress a few times, zeros a thousand times.
@@ -93,12 +98,83 @@ impl ZipFiles {
         }
     }
 
-    /// The same zip with other bytes for the glTF; all other entries keep their compressed bytes.
+    /// The same zip with the mended glTF, and an entry with which [`ZipFiles::before`] undoes that.
     pub fn with_main(&self, main: &[u8]) -> Result<Vec<u8>, ScanError> {
+        let number = 1 + self.undo_entries().last().map_or(0, |(number, _)| number);
+        let mended = self.with_entries(main, |_| true)?;
+        let undo = zip_undo::record(self, &ZipFiles::open(mended.clone().into())?)?;
+        let mut out = ZipWriter::new_append(Cursor::new(mended)).map_err(zip_error)?;
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Deflated)
+            .large_file(u32::try_from(undo.len()).is_err());
+        out.start_file(format!("{UNDO_NAME}{number}{UNDO_ENDING}"), options)
+            .map_err(zip_error)?;
+        out.write_all(&undo)
+            .map_err(|error| broken(error.to_string()))?;
+        Ok(out.finish().map_err(zip_error)?.into_inner())
+    }
+
+    /// The same zip with other bytes for the glTF, and without the entries that undo its mends.
+    pub fn replaced(&self, main: &[u8]) -> Result<Vec<u8>, ScanError> {
+        let undo: Vec<String> = self.undo_entries().map(|(_, name)| name).collect();
+        self.with_entries(main, |name| !undo.iter().any(|it| it == name))
+    }
+
+    /// The zip before its last mend; `None` if it does not say so, or was changed afterwards.
+    pub fn before(&self, allowance: &DecodeAllowance<'_>) -> Result<Option<Vec<u8>>, ScanError> {
+        let Some((_, name)) = self.undo_entries().last() else {
+            return Ok(None);
+        };
+        let record = self.entry(&name, allowance)?;
+        record.map_or(Ok(None), |record| {
+            zip_undo::before(&self.bytes, &record, allowance)
+        })
+    }
+
+    /// The entries that undo mends, by their numbers, the last mend last.
+    fn undo_entries(&self) -> impl Iterator<Item = (u32, String)> + use<> {
+        let numbered = |name: &str| {
+            let digits = name.strip_prefix(UNDO_NAME)?.strip_suffix(UNDO_ENDING)?;
+            Some((digits.parse().ok()?, name.to_owned()))
+        };
+        let mut all: Vec<(u32, String)> = self.archive.file_names().filter_map(numbered).collect();
+        all.sort_unstable();
+        all.into_iter()
+    }
+
+    /// The zip's bytes in the entry with this name, still compressed, as a range of `bytes`; `None` if it is not there.
+    pub fn compressed(&self, name: &str) -> Result<Option<Range<usize>>, ScanError> {
+        let mut archive = self.archive.clone();
+        let Some(index) = archive.index_for_name(name) else {
+            return Ok(None);
+        };
+        let entry = archive.by_index_raw(index).map_err(zip_error)?;
+        let start = entry.data_start().and_then(|it| usize::try_from(it).ok());
+        let length = usize::try_from(entry.compressed_size()).ok();
+        let range = start
+            .zip(length)
+            .and_then(|(start, length)| Some(start..start.checked_add(length)?));
+        Ok(range.filter(|range| range.end <= self.bytes.len()))
+    }
+
+    /// The names of all entries.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.archive.file_names()
+    }
+
+    /// The zip with other bytes for the glTF; of the other entries those that are kept have their compressed bytes.
+    fn with_entries(
+        &self,
+        main: &[u8],
+        keeps: impl Fn(&str) -> bool,
+    ) -> Result<Vec<u8>, ScanError> {
         let mut archive = self.archive.clone();
         let mut out = ZipWriter::new(Cursor::new(Vec::with_capacity(self.bytes.len())));
         for index in 0..archive.len() {
             let entry = archive.by_index_raw(index).map_err(zip_error)?;
+            if !keeps(entry.name()) {
+                continue;
+            }
             if entry.name() != self.main {
                 out.raw_copy_file(entry).map_err(zip_error)?;
                 continue;
@@ -116,6 +192,7 @@ impl ZipFiles {
             out.write_all(main)
                 .map_err(|error| broken(error.to_string()))?;
         }
+        out.set_raw_comment(self.archive.comment().into());
         Ok(out.finish().map_err(zip_error)?.into_inner())
     }
 
@@ -155,7 +232,7 @@ fn zip_error(error: ZipError) -> ScanError {
     broken(error.to_string())
 }
 
-fn broken(detail: String) -> ScanError {
+pub(super) fn broken(detail: String) -> ScanError {
     ScanError::Container {
         offset: 0,
         detail: format!("the zip: {detail}"),

@@ -26,6 +26,9 @@ pub enum MendError {
         /// Its loops, and why each is left as it is.
         skipped: Vec<v1::Skipped>,
     },
+    /// The scan has nothing of darn's.
+    #[error("the scan has no patch, cut or record of darn's; there is nothing to strip")]
+    NothingToStrip,
     /// The request asks for more holes than are filled at once.
     #[error(
         "{found} holes are to be filled, and at most {limit} are at once; choose among them by `holes`"
@@ -178,6 +181,7 @@ impl MendError {
             MendError::Constraints(_) => codes::CONSTRAINTS_DO_NOT_FIT,
             MendError::OutOfReach(_) => codes::ANCHOR_OUT_OF_REACH,
             MendError::NoHoles { .. } => codes::NO_HOLES,
+            MendError::NothingToStrip => codes::NOTHING_TO_STRIP,
             MendError::TooManyHoles { .. } => codes::TOO_MANY_HOLES,
             MendError::NonManifold { .. } => codes::NON_MANIFOLD_RIM,
             MendError::Region {

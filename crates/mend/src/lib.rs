@@ -8,7 +8,7 @@
 //! it, `moved_fill` asks the network for cloth that moved, `fill_hole` meshes it, `separate` pushes neighbouring
 //! patches apart, `hole_report` measures the patch, and `addition` writes it in glTF terms. `scan_holes` runs these
 //! stages for all holes of a scan; [`mend`] drops it, a [`ScanSession`] keeps it. `edit` holds the gestures and the
-//! anchor search. [`SharedMender`] is the port's [`Mender`](darn_contract::port::Mender).
+//! anchor search. [`strip`] undoes mends. [`SharedMender`] is the port's [`Mender`](darn_contract::port::Mender).
 //!
 //! No async, no I/O, and no clocks except for the report's timings. The bytes depend on scan, constraints, weights and
 //! version alone.
@@ -49,6 +49,7 @@ mod scan_notes;
 mod select;
 mod separate;
 mod session;
+mod strip;
 mod suspects;
 #[cfg(test)]
 mod testing;
@@ -69,6 +70,7 @@ pub use limits::{EditedFill, MendLimits};
 pub use mender::{Call, NetworkMender};
 pub use port::SharedMender;
 pub use session::{ScanSession, SessionCall};
+pub use strip::strip;
 pub use timings::add_read_time;
 
 use scan_holes::ScanHoles;

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use darn_budget::Budget;
 use darn_contract::port::{
-    EditSession, HolesQuery, Mended, Mender, PatchForm, Patches, Refusal, ScanForm,
+    EditSession, HolesQuery, Mended, Mender, PatchForm, Patches, Refusal, ScanForm, Stripped,
 };
 use darn_contract::{Constraints, Search, error_chain, v1};
 use darn_gltf_scan::{Container, Scan, repacked};
@@ -75,6 +75,10 @@ impl Mender for SharedMender {
             media_type: container.media_type(),
             report: mended.report,
         })
+    }
+
+    fn strip(&self, scan: Bytes, form: ScanForm, budget: &Budget<'_>) -> Result<Stripped, Refusal> {
+        crate::strip(scan, form, &self.0.scan_limits, budget).map_err(refusal)
     }
 
     fn optimize_anchor(

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use bytes::Bytes;
 use clap::Parser;
 use darn_budget::Budget;
-use darn_contract::port::{EditSession, HolesQuery, Mended, Mender, Refusal};
+use darn_contract::port::{EditSession, HolesQuery, Mended, Mender, Refusal, ScanForm, Stripped};
 use darn_contract::{Constraints, Search, codes, v1};
 use darn_serve::{LogDelivery, LogError, ServeArgs, ServeError, run, start_logging};
 
@@ -31,6 +31,11 @@ impl Mender for Echo {
             media_type: "model/gltf-binary",
             report,
         })
+    }
+
+    fn strip(&self, _: Bytes, _: ScanForm, _: &Budget<'_>) -> Result<Stripped, Refusal> {
+        let nothing = "this mender puts nothing in";
+        Err(Refusal::new(codes::NOTHING_TO_STRIP, nothing))
     }
 
     fn find_holes(

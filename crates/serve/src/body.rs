@@ -56,7 +56,7 @@ impl ScanRequest<Constraints> {
         if self.parameters.is_none() {
             return Ok(self);
         }
-        let detail = "finding holes takes no constraints in this version";
+        let detail = "this request takes no constraints";
         Err(Constraints::invalid(vec![FieldError::new("", detail)]))
     }
 }

@@ -21,10 +21,13 @@ use super::{
     telemetry::RequestId,
     uploads::BodySize,
 };
-use darn_contract::port::{HolesQuery, Mended};
+use darn_contract::port::{HolesQuery, Mended, ScanForm, Stripped};
 use darn_contract::{
     Constraints, Search, excerpt,
-    v1::{self, AnchorFound, HolesReport, InpaintChunk, ScanChunk, inpaint_chunk::Part},
+    v1::{
+        self, AnchorFound, HolesReport, InpaintChunk, ScanChunk, StripChunk, inpaint_chunk::Part,
+        strip_chunk,
+    },
 };
 
 /// Bytes of a scan per message of an answer.
@@ -45,7 +48,8 @@ pub struct GrpcService(Arc<App>);
 
 #[tonic::async_trait]
 impl Darn for GrpcService {
-    type InpaintStream = MendedStream;
+    type InpaintStream = ChunkStream<InpaintChunk>;
+    type StripStream = ChunkStream<StripChunk>;
 
     async fn find_holes(
         &self,
@@ -61,10 +65,19 @@ impl Darn for GrpcService {
     async fn inpaint(
         &self,
         request: Request<Streaming<ScanChunk>>,
-    ) -> Result<Response<MendedStream>, Status> {
+    ) -> Result<Response<ChunkStream<InpaintChunk>>, Status> {
         let id = request_id(&request);
         let mended = self.mend(request).await.map_err(|error| error.grpc(&id))?;
-        Ok(Response::new(MendedStream::of(mended)))
+        Ok(Response::new(ChunkStream::of_mended(mended)))
+    }
+
+    async fn strip(
+        &self,
+        request: Request<Streaming<ScanChunk>>,
+    ) -> Result<Response<ChunkStream<StripChunk>>, Status> {
+        let id = request_id(&request);
+        let stripped = (self.stripped(request).await).map_err(|error| error.grpc(&id))?;
+        Ok(Response::new(ChunkStream::of_stripped(stripped)))
     }
 
     async fn optimize_anchor(
@@ -116,6 +129,19 @@ impl GrpcService {
         Ok(mended)
     }
 
+    async fn stripped(
+        &self,
+        request: Request<Streaming<ScanChunk>>,
+    ) -> Result<Stripped, RequestError> {
+        let received = self.receive::<Constraints>(request).await?;
+        let ScanRequest { scan, upload, .. } = received.without_constraints()?;
+        self.0
+            .submit(upload, scan.len(), move |mender, budget| {
+                mender.strip(scan, ScanForm::AsReceived, budget)
+            })
+            .await
+    }
+
     async fn search(
         &self,
         request: Request<Streaming<ScanChunk>>,
@@ -163,7 +189,7 @@ impl GrpcService {
             }
             if chunk.constraints.is_some() || chunk.query.is_some() || chunk.holes.is_some() {
                 return Err(RequestError::Malformed(
-                    "Inpaint takes `constraints`, OptimizeAnchor `query`, FindHoles `holes`, and none of them another's"
+                    "Inpaint takes `constraints`, OptimizeAnchor `query`, FindHoles `holes`, none of them another's, and Strip none"
                         .to_owned(),
                 ));
             }
@@ -231,30 +257,52 @@ fn request_id<T>(request: &Request<T>) -> String {
         .unwrap_or_default()
 }
 
-/// A mended scan in chunks: the report, then the scan's bytes in order.
+/// A scan in chunks: the report, then the scan's bytes in order.
 #[derive(Debug)]
-pub struct MendedStream {
-    report: Option<Part>,
+pub struct ChunkStream<C> {
+    /// The first chunk, until it is sent.
+    report: Option<C>,
     scan: Bytes,
+    /// Makes a chunk of bytes.
+    data: fn(Bytes) -> C,
 }
 
-impl MendedStream {
-    fn of(mended: Mended) -> Self {
+impl ChunkStream<InpaintChunk> {
+    fn of_mended(mended: Mended) -> Self {
         Self {
-            report: Some(Part::Report(mended.report)),
+            report: Some(InpaintChunk {
+                part: Some(Part::Report(mended.report)),
+            }),
             scan: mended.bytes.into(),
+            data: |bytes| InpaintChunk {
+                part: Some(Part::Data(bytes)),
+            },
         }
     }
 }
 
-impl Stream for MendedStream {
-    type Item = Result<InpaintChunk, Status>;
+impl ChunkStream<StripChunk> {
+    fn of_stripped(stripped: Stripped) -> Self {
+        Self {
+            report: Some(StripChunk {
+                part: Some(strip_chunk::Part::Report(stripped.report)),
+            }),
+            scan: stripped.bytes.into(),
+            data: |bytes| StripChunk {
+                part: Some(strip_chunk::Part::Data(bytes)),
+            },
+        }
+    }
+}
+
+impl<C: Unpin> Stream for ChunkStream<C> {
+    type Item = Result<C, Status>;
 
     fn poll_next(mut self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<Option<Self::Item>> {
-        let part = self.report.take().or_else(|| {
+        let chunk = self.report.take().or_else(|| {
             let next = self.scan.len().min(CHUNK_BYTES);
-            (next > 0).then(|| Part::Data(self.scan.split_to(next)))
+            (next > 0).then(|| (self.data)(self.scan.split_to(next)))
         });
-        Poll::Ready(part.map(|part| Ok(InpaintChunk { part: Some(part) })))
+        Poll::Ready(chunk.map(Ok))
     }
 }

@@ -42,6 +42,7 @@ pub fn document() -> Value {
             "/inpaint": { "post": inpaint() },
             "/holes": { "post": holes() },
             "/optimize-anchor": { "post": optimize_anchor() },
+            "/strip": { "post": strip() },
             "/sessions": { "post": sessions::open() },
             "/sessions/{id}": { "get": sessions::describe(), "delete": sessions::delete() },
             "/sessions/{id}/inpaint": { "post": sessions::inpaint() },
@@ -105,6 +106,30 @@ fn optimize_anchor() -> Value {
             found,
             "A scan or a query that cannot be searched; `errors` names the fields of the query",
         ),
+    })
+}
+
+fn strip() -> Value {
+    let mut found = mended(
+        "The scan without what darn put in, in the container of the input; one that came with its files goes back as a mended one does",
+        "scan",
+        &[GLB, GLTF, ZIP],
+    );
+    found["content"][MULTIPART_MIXED]["schema"]["properties"]["report"] = reference("StripReport");
+    found["headers"] = json!({ "darn-strip": {
+        "description": "`exact`: the bytes from before the first mend, proven by their digest; `structural`: the file was changed \
+            afterwards, and darn's patches were taken out of what it is now",
+        "schema": { "type": "string", "enum": ["exact", "structural"] },
+    } });
+    let description = found["description"].as_str().unwrap_or_default();
+    found["description"] = description
+        .replace("schema Report", "schema StripReport")
+        .into();
+    json!({
+        "summary": "Take everything out of a scan that darn put in",
+        "operationId": "strip",
+        "requestBody": body(&[], &[]),
+        "responses": responses("200", found, "With code `nothing_to_strip`: the scan has nothing of darn's"),
     })
 }
 

@@ -14,7 +14,7 @@ use super::{
     media_types::{GLB, JSON, MULTIPART_MIXED, OCTET_STREAM},
     telemetry::Metrics,
 };
-use darn_contract::port::{Mended, PatchForm, Patches};
+use darn_contract::port::{Mended, PatchForm, Patches, Stripped};
 use darn_contract::{Outcome, v1};
 
 /// How many holes were filled.
@@ -26,6 +26,9 @@ pub const RESULT: HeaderName = HeaderName::from_static("darn-result");
 pub const LOOPS_SKIPPED: HeaderName = HeaderName::from_static("darn-loops-skipped");
 /// Largest distance between the cloth and an anchor, those of gestures included, in the scene's unit; absent without anchors.
 pub const ANCHOR_DISTANCE: HeaderName = HeaderName::from_static("darn-anchor-distance");
+
+/// Whether a stripped scan has its bytes from before the first mend (`exact`), or only its patches were taken out of what it is now (`structural`).
+pub const STRIP: HeaderName = HeaderName::from_static("darn-strip");
 
 /// Keeps caches from storing an answer whose content changes.
 const NO_STORE: (HeaderName, &str) = (header::CACHE_CONTROL, "no-store");
@@ -81,23 +84,59 @@ impl MendResponse {
     pub fn render(self, preferred: &str, metrics: &Metrics) -> Response {
         metrics.mended(&self.report);
         let headers = report_headers(&self.report);
-        let (media_type, body) = if preferred == MULTIPART_MIXED {
-            self.multipart()
-        } else {
-            (self.media_type.to_owned(), self.bytes)
+        let report = (preferred == MULTIPART_MIXED).then(|| json(&self.report));
+        let file = FilePart {
+            name: self.part,
+            media_type: self.media_type,
+            bytes: self.bytes,
+        };
+        file.render(report, headers)
+    }
+}
+
+/// The answer of a stripped scan in the media type that the caller prefers, as [`MendResponse::render`] writes it; to be called on a worker.
+pub fn stripped(stripped: Stripped, preferred: &str) -> Response {
+    let how = if stripped.report.exact {
+        "exact"
+    } else {
+        "structural"
+    };
+    let headers = HeaderMap::from_iter([(STRIP, HeaderValue::from_static(how))]);
+    let report = (preferred == MULTIPART_MIXED).then(|| json(&stripped.report));
+    let file = FilePart {
+        name: "scan",
+        media_type: stripped.media_type,
+        bytes: stripped.bytes,
+    };
+    file.render(report, headers)
+}
+
+/// A file to answer with.
+struct FilePart {
+    /// Name of its part in multipart/mixed.
+    name: &'static str,
+    media_type: &'static str,
+    bytes: Vec<u8>,
+}
+
+impl FilePart {
+    /// The file after a report in multipart/mixed, or alone.
+    fn render(self, report: Option<Vec<u8>>, headers: HeaderMap) -> Response {
+        let (media_type, body) = match report {
+            Some(report) => self.multipart(&report),
+            None => (self.media_type.to_owned(), self.bytes),
         };
         let media_type = [(header::CONTENT_TYPE, media_type)];
         let body = Body::from(body);
         (StatusCode::OK, media_type, [NO_STORE], headers, body).into_response()
     }
 
-    fn multipart(self) -> (String, Vec<u8>) {
+    fn multipart(self, report: &[u8]) -> (String, Vec<u8>) {
         let boundary = format!("darn-{}", Uuid::new_v4().simple());
-        let report = json(&self.report);
         let mut body = Vec::with_capacity(self.bytes.len() + report.len() + 512);
         for (name, media_type, bytes) in [
-            ("report", JSON, &report),
-            (self.part, self.media_type, &self.bytes),
+            ("report", JSON, report),
+            (self.name, self.media_type, &self.bytes),
         ] {
             let head = format!(
                 "--{boundary}\r\ncontent-disposition: attachment; name=\"{name}\"\r\ncontent-type: {media_type}\r\ncontent-length: {}\r\n\r\n",

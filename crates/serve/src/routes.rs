@@ -25,7 +25,7 @@ use super::{
     error::RequestError,
     media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, PROMETHEUS, ZIP},
     openapi, parameters,
-    response::{self, ANCHOR_DISTANCE, HOLES_FILLED, LOOPS_SKIPPED, MendResponse, RESULT},
+    response::{self, ANCHOR_DISTANCE, HOLES_FILLED, LOOPS_SKIPPED, MendResponse, RESULT, STRIP},
     scan_files::AnswerForm,
     service_info, session_routes,
     telemetry::{REQUEST_ID, RequestId},
@@ -38,6 +38,7 @@ pub fn routes() -> Router<Arc<App>> {
         .route("/inpaint", post(inpaint))
         .route("/holes", post(holes))
         .route("/optimize-anchor", post(optimize_anchor))
+        .route("/strip", post(strip))
         .merge(session_routes::routes())
         .route("/livez", get(|| async { "alive\n" }))
         .route("/readyz", get(readyz))
@@ -85,6 +86,7 @@ fn cors(origins: &[String]) -> CorsLayer {
             HOLES_FILLED,
             LOOPS_SKIPPED,
             RESULT,
+            STRIP,
             ANCHOR_DISTANCE,
             REQUEST_ID,
             header::LOCATION,
@@ -183,6 +185,23 @@ async fn holes(State(app): State<Arc<App>>, request: Request) -> Result<Response
         })
         .await?;
     Ok(response::json_response(text))
+}
+
+async fn strip(State(app): State<Arc<App>>, request: Request) -> Result<Response, RequestError> {
+    let headers = request.headers().clone();
+    let received = body::receive_scan(&app, request).await?;
+    let ScanRequest {
+        scan,
+        files,
+        upload,
+        ..
+    } = received.without_constraints()?;
+    let AnswerForm { media_type, form } = files.answer(&headers);
+    app.submit(upload, scan.len(), move |mender, budget| {
+        let stripped = mender.strip(scan, form, budget)?;
+        Ok(response::stripped(stripped, media_type))
+    })
+    .await
 }
 
 async fn optimize_anchor(

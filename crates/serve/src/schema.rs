@@ -25,9 +25,9 @@ pub(super) fn schemas() -> Map<String, Value> {
     let Some(file) = set.file.iter().find(|file| file.package() == PACKAGE) else {
         return Map::new();
     };
-    let messages = (0..)
-        .zip(&file.message_type)
-        .filter(|(_, message)| !matches!(message.name(), "ScanChunk" | "InpaintChunk"));
+    let messages = (0..).zip(&file.message_type).filter(|(_, message)| {
+        !matches!(message.name(), "ScanChunk" | "InpaintChunk" | "StripChunk")
+    });
     let messages =
         messages.map(|(i, message)| (message.name().to_owned(), object(file, i, message)));
     let enums = (0..)
