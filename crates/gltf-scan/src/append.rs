@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use gltf::json::accessor::{ComponentType, Type};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::buffers::BufferTarget;
 use super::compressed::meshopt;
@@ -22,6 +22,8 @@ pub(super) struct Appender<'s> {
     lists: BTreeMap<&'static str, Vec<Value>>,
     /// New primitives by mesh.
     primitives: BTreeMap<usize, Vec<Value>>,
+    /// New elements of a list in an extension at the top of the JSON, by the names of the extension and the list.
+    extensions: BTreeMap<(&'static str, &'static str), Vec<Value>>,
     /// Members to set in what is there: their paths and values.
     members: Vec<(Vec<String>, Value)>,
     /// The buffer that takes the new bytes.
@@ -98,6 +100,7 @@ impl<'s> Appender<'s> {
             scan,
             lists: BTreeMap::new(),
             primitives: BTreeMap::new(),
+            extensions: BTreeMap::new(),
             members: Vec::new(),
             buffer,
             start,
@@ -119,6 +122,27 @@ impl<'s> Appender<'s> {
         old + list.len() - 1
     }
 
+    /// Appends to a list of an extension at the top of the JSON, which is created if it is missing; what is there must be
+    /// objects and a list.
+    pub fn push_to_extension(&mut self, extension: &'static str, list: &'static str, value: Value) {
+        let lists = &mut self.extensions;
+        lists.entry((extension, list)).or_default().push(value);
+    }
+
+    /// Lists an extension as used.
+    pub fn uses(&mut self, extension: &'static str) {
+        let old = self
+            .scan
+            .json
+            .get("extensionsUsed")
+            .and_then(Value::as_array);
+        let new = self.lists.get("extensionsUsed");
+        let mut all = old.into_iter().chain(new).flatten();
+        if !all.any(|name| name == extension) {
+            self.push("extensionsUsed", extension.into());
+        }
+    }
+
     /// Appends a primitive to a mesh.
     pub fn primitive(&mut self, mesh: usize, primitive: Value) {
         self.primitives.entry(mesh).or_default().push(primitive);
@@ -137,21 +161,32 @@ impl<'s> Appender<'s> {
         }
     }
 
+    /// Appends a buffer view; returns its index.
+    pub fn view(&mut self, name: &str, bytes: &[u8]) -> usize {
+        let view = json!({
+            "name": name,
+            "buffer": self.buffer,
+            "byteOffset": self.start + self.data.len(),
+            "byteLength": bytes.len(),
+        });
+        self.data.extend_from_slice(bytes);
+        // The next buffer view starts at a multiple of four.
+        self.data.resize(self.data.len().next_multiple_of(4), 0);
+        self.push("bufferViews", view)
+    }
+
     /// Appends an accessor with a buffer view of its own; returns the accessor's index.
     pub fn accessor(&mut self, data: AccessorData<'_>) -> Value {
         let size = data.component.size() * data.kind.multiplicity();
         let count = data.bytes.len() / size;
-        let view = json!({
-            "name": data.name,
-            "buffer": self.buffer,
-            "byteOffset": self.start + self.data.len(),
-            "byteLength": data.bytes.len(),
-            "target": data.target as u32,
-        });
-        self.data.extend_from_slice(&data.bytes);
-        // The next buffer view starts at a multiple of four.
-        self.data.resize(self.data.len().next_multiple_of(4), 0);
-        let view = self.push("bufferViews", view);
+        let view = self.view(data.name, &data.bytes);
+        let made = self
+            .lists
+            .get_mut("bufferViews")
+            .and_then(|list| list.last_mut());
+        if let Some(made) = made.and_then(Value::as_object_mut) {
+            made.insert("target".into(), json!(data.target as u32));
+        }
         let mut accessor = json!({
             "name": data.name,
             "bufferView": view,
@@ -193,6 +228,7 @@ impl<'s> Appender<'s> {
             let path: Vec<&str> = path.iter().map(String::as_str).collect();
             edit.set(&path, value)?;
         }
+        self.extend_extensions(&mut edit)?;
         for (mesh, primitives) in &self.primitives {
             edit.append(&["meshes", &mesh.to_string(), "primitives"], primitives)?;
         }
@@ -219,6 +255,37 @@ impl<'s> Appender<'s> {
             pack_glb(&text, bin.as_deref(), rest).ok_or_else(|| too_long(text.len() + length))?;
         out.extend_from_slice(bytes.get(layout.trailing.clone()).unwrap_or_default());
         Ok(out)
+    }
+}
+
+impl Appender<'_> {
+    /// Writes the new elements of lists in extensions at the top of the JSON.
+    fn extend_extensions(&self, edit: &mut JsonEdit<'_>) -> Result<(), ScanError> {
+        let old = self.scan.json.get("extensions");
+        let mut fresh: BTreeMap<&str, Map<String, Value>> = BTreeMap::new();
+        for ((extension, list), values) in &self.extensions {
+            let known = old.and_then(|old| old.get(*extension));
+            match known {
+                Some(known) if known.get(*list).is_some() => {
+                    edit.append(&["extensions", extension, list], values)?;
+                }
+                Some(_) => edit.set(&["extensions", extension, list], &json!(values))?,
+                None => {
+                    let fresh = fresh.entry(extension).or_default();
+                    fresh.insert((*list).to_owned(), json!(values));
+                }
+            }
+        }
+        if fresh.is_empty() {
+            return Ok(());
+        }
+        if old.is_none() {
+            return edit.set(&["extensions"], &json!(fresh));
+        }
+        for (extension, lists) in &fresh {
+            edit.set(&["extensions", extension], &json!(lists))?;
+        }
+        Ok(())
     }
 }
 

@@ -28,7 +28,9 @@ pub(super) struct CheckedPatch<'s> {
 pub(super) struct PatchKind {
     node: usize,
     mesh: usize,
-    material: Option<usize>,
+    /// Number of the materials.
+    materials: usize,
+    hatch: Option<usize>,
     both_sides: bool,
     normals: bool,
     texcoords: usize,
@@ -100,13 +102,15 @@ impl<'s> CheckedPatch<'s> {
         })
     }
 
-    /// What patches must have in common to share a primitive.
-    pub fn kind(&self) -> PatchKind {
+    /// What patches must have in common to share a primitive; `materials` is a number of the materials that the part has
+    /// whose look it takes.
+    pub fn kind(&self, materials: usize) -> PatchKind {
         let kinds = self.look.color_kinds.iter();
         PatchKind {
             node: self.home.node,
             mesh: self.home.mesh,
-            material: self.look.material,
+            materials,
+            hatch: self.look.hatch,
             both_sides: self.patch.both_sides,
             normals: self.look.normals.is_some(),
             texcoords: self.patch.texcoords.len(),

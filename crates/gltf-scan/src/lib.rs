@@ -27,13 +27,14 @@ pub mod export;
 mod files;
 #[cfg(test)]
 mod files_tests;
+mod hatch;
 mod json;
 mod json_edit;
 mod left_out;
 mod limits;
-mod material_copy;
 mod pack;
 mod patch_group;
+mod patch_materials;
 mod patch_primitive;
 mod patch_skin;
 mod primitive;
@@ -51,6 +52,9 @@ pub(crate) mod testing;
 mod triangles;
 mod undo;
 mod unmarked;
+mod variants;
+#[cfg(test)]
+mod variants_tests;
 mod write;
 #[cfg(test)]
 mod write_tests;

@@ -12,6 +12,7 @@ use super::buffers::BufferTarget;
 use super::checked_patch::CheckedPatch;
 use super::container::float_bytes;
 use super::cut::index_bytes;
+use super::hatch;
 use super::scan::ScanPart;
 use super::skin::Influence;
 
@@ -20,6 +21,14 @@ use super::skin::Influence;
 enum PatchSide {
     Front,
     Back,
+}
+
+/// How a primitive of patches looks.
+pub(super) struct PrimitiveLook {
+    /// Index of its material.
+    pub material: usize,
+    /// Its `extensions`: the materials of the variants.
+    pub extensions: Option<Value>,
 }
 
 /// Patches of one [kind](CheckedPatch::kind).
@@ -63,9 +72,20 @@ impl<'s> PatchGroup<'s> {
         self.first.look
     }
 
+    /// The set of texture coordinates that is the hatch's: the patch's own, after those of the cloth; `None` if there is no
+    /// room for it.
+    pub fn hatch(&self) -> Option<usize> {
+        let look = self.look();
+        let set = match look.hatch.filter(|set| *set < look.texcoords.len()) {
+            Some(own) => own,
+            None => look.texcoords.len(),
+        };
+        (set < hatch::MOST_SETS).then_some(set)
+    }
+
     /// Appends the primitive, and one of the other side if the patches have one.
-    pub fn append(&self, out: &mut Appender<'_>, material: Option<usize>) {
-        let front = self.front(out, material);
+    pub fn append(&self, out: &mut Appender<'_>, look: &PrimitiveLook) {
+        let front = self.front(out, look);
         let back = (self.first.patch.both_sides).then(|| self.back(out, &front));
         for primitive in [front].into_iter().chain(back) {
             out.primitive(self.home().mesh, primitive);
@@ -85,7 +105,7 @@ impl<'s> PatchGroup<'s> {
     }
 
     /// Appends the accessors of the front; returns the primitive with them.
-    fn front(&self, out: &mut Appender<'_>, material: Option<usize>) -> Value {
+    fn front(&self, out: &mut Appender<'_>, look: &PrimitiveLook) -> Value {
         let mut attributes = Map::new();
         let points = self.rows(|patch| &patch.points);
         let bounds = Some(AccessorBounds::of(&points));
@@ -94,8 +114,13 @@ impl<'s> PatchGroup<'s> {
             let normals: Vec<[f32; 3]> = self.patches().flat_map(CheckedPatch::normals).collect();
             attributes.insert("NORMAL".into(), self.floats(out, &normals, None));
         }
-        for n in 0..self.first.patch.texcoords.len() {
-            let set = self.rows(|it| it.patch.texcoords.get(n).map_or(&[], Vec::as_slice));
+        let hatch = look.extensions.as_ref().and_then(|_| self.hatch());
+        let own = self.first.patch.texcoords.len();
+        for n in 0..own + usize::from(hatch == Some(own)) {
+            let set = match hatch {
+                Some(hatch) if hatch == n => self.hatch_coordinates(),
+                _ => self.rows(|it| it.patch.texcoords.get(n).map_or(&[], Vec::as_slice)),
+            };
             attributes.insert(format!("TEXCOORD_{n}"), self.floats(out, &set, None));
         }
         for (n, kind) in self.look().color_kinds.iter().enumerate() {
@@ -127,15 +152,28 @@ impl<'s> PatchGroup<'s> {
         let mut primitive = Map::new();
         primitive.insert("attributes".into(), Value::Object(attributes));
         primitive.insert("indices".into(), self.indices(out, PatchSide::Front));
-        if let Some(material) = material {
-            primitive.insert("material".into(), json!(material));
-        }
+        primitive.insert("material".into(), json!(look.material));
         primitive.insert("mode".into(), json!(TRIANGLES));
         if !targets.is_empty() {
             primitive.insert("targets".into(), Value::Array(targets));
         }
-        primitive.insert("extras".into(), json!({ "darn": self.record() }));
+        if let Some(extensions) = &look.extensions {
+            primitive.insert("extensions".into(), extensions.clone());
+        }
+        let mut record = self.record();
+        if let Some(hatch) = hatch {
+            record.insert("hatch".into(), json!(hatch));
+        }
+        primitive.insert("extras".into(), json!({ "darn": record }));
         Value::Object(primitive)
+    }
+
+    /// The hatch of all patches, each laid on its own.
+    fn hatch_coordinates(&self) -> Vec<[f32; 2]> {
+        let each = self
+            .patches()
+            .map(|patch| hatch::coordinates(&patch.points));
+        each.flatten().collect()
     }
 
     /// The primitive of the back: it shares all accessors of the front except normals and indices.

@@ -324,6 +324,8 @@ impl<'d, 'a> ScanReader<'d, 'a> {
             normals,
             reconstructed: place.value.pointer("/extras/darn/reconstructed")
                 == Some(&Value::Bool(true)),
+            hatch: (place.value.pointer("/extras/darn/hatch"))
+                .and_then(|set| usize::try_from(set.as_u64()?).ok()),
             shared: instance.shared,
             first_instance: instance.first,
             targets: self.count_targets(place)?,

@@ -61,6 +61,8 @@ pub struct ScanPart {
     pub normals: Option<Arc<[[f32; 3]]>>,
     /// Whether darn made it: its `extras.darn.reconstructed` says so.
     pub reconstructed: bool,
+    /// The set of texture coordinates that the hatch of darn's marks has here, if darn made it.
+    pub(crate) hatch: Option<usize>,
     /// Whether several drawn nodes share this mesh: a patch written once then shows at each of them.
     pub shared: bool,
     /// Whether this is the first drawn node of its mesh, the one to patch.

@@ -321,7 +321,8 @@ fn patches_of_a_scan_that_others_changed_are_taken_out_of_what_it_is_now() {
             assert_eq!(triangles(&stripped.bytes), triangles(&before), "{kind}");
             let text = String::from_utf8_lossy(&stripped.bytes);
             assert!(text.contains("Blender") && !text.contains("\"undo\""));
-            assert!(!text.contains("reconstructed"), "{kind}");
+            assert!(!text.contains("reconstruct"), "{kind}");
+            assert!(!text.contains("KHR_"), "{kind}");
             assert!(strip(&stripped.bytes).is_none(), "nothing is left to strip");
         }
     }
@@ -408,5 +409,5 @@ fn a_record_is_small() {
     let text = String::from_utf8_lossy(&bytes);
     let record = &text[text.find("\"undo\":").unwrap()..];
     let length = record.find("]]").unwrap();
-    assert!(length < 400, "{length}");
+    assert!(length < 500, "{length}");
 }

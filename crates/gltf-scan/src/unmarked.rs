@@ -8,6 +8,8 @@ use std::collections::BTreeSet;
 
 use serde_json::{Map, Value};
 
+use super::variants;
+
 /// What a scan has of darn.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Marks {
@@ -64,6 +66,7 @@ pub(super) fn without_marks(json: &mut Value) -> Option<Vec<String>> {
     if !found {
         return None;
     }
+    remove_variants(json);
     remove_materials(json);
     Some(notes)
 }
@@ -206,6 +209,58 @@ fn remove_records(json: &mut Value) -> bool {
         }
     }
     found
+}
+
+/// Removes darn's variants from the end of the list, as far as no primitive maps them.
+fn remove_variants(json: &mut Value) {
+    let mut mapped = BTreeSet::new();
+    let mut is_used = false;
+    for (_, primitive) in primitives(json) {
+        let extension = primitive
+            .get("extensions")
+            .and_then(|all| all.get(variants::EXTENSION));
+        is_used |= extension.is_some();
+        let mappings = extension.and_then(|it| it.get("mappings")?.as_array());
+        for mapping in mappings.into_iter().flatten() {
+            let variants = mapping.get("variants").and_then(Value::as_array);
+            mapped.extend(variants.into_iter().flatten().filter_map(Value::as_u64));
+        }
+    }
+    let own = [variants::BLENDED, variants::MARKED];
+    let Some(extensions) = json.get_mut("extensions").and_then(Value::as_object_mut) else {
+        return;
+    };
+    let list = extensions
+        .get_mut(variants::EXTENSION)
+        .and_then(|it| it.get_mut("variants"));
+    let Some(list) = list.and_then(Value::as_array_mut) else {
+        return;
+    };
+    while let Some(last) = list.last() {
+        let name = last.get("name").and_then(Value::as_str);
+        let is_own = name.is_some_and(|name| own.contains(&name));
+        if !is_own || mapped.contains(&(list.len() as u64 - 1)) {
+            break;
+        }
+        list.pop();
+    }
+    if !list.is_empty() || is_used {
+        return;
+    }
+    extensions.shift_remove(variants::EXTENSION);
+    let emptied = extensions.is_empty();
+    let Some(root) = json.as_object_mut() else {
+        return;
+    };
+    if emptied {
+        root.shift_remove("extensions");
+    }
+    if let Some(used) = root.get_mut("extensionsUsed").and_then(Value::as_array_mut) {
+        used.retain(|name| name != variants::EXTENSION);
+        if used.is_empty() {
+            root.shift_remove("extensionsUsed");
+        }
+    }
 }
 
 /// Removes darn's copies of materials from the end of the list, as far as no primitive uses them.

@@ -9,10 +9,11 @@ use super::checked_patch::CheckedPatch;
 use super::cut::cut_primitives;
 use super::error::ScanError;
 use super::files::Companions;
-use super::material_copy::copy_material;
-use super::patch_group::PatchGroup;
+use super::patch_group::{PatchGroup, PrimitiveLook};
+use super::patch_materials::PatchMaterialsMaker;
 use super::patch_primitive::PatchPrimitive;
 use super::scan::Scan;
+use super::variants::{MaterialChoices, Variants};
 
 impl Scan {
     /// The scan with patches appended, in the container it was read from. Without patches and cuts: the bytes that were
@@ -46,22 +47,29 @@ impl Scan {
         }
         let mut out = Appender::new(self);
         cut_primitives(self, &mut out)?;
-        let mut materials = BTreeMap::new();
-        for group in self.groups(patches)? {
+        let variants = Variants::of(self);
+        let mut materials = PatchMaterialsMaker::new(self);
+        for group in self.groups(patches, variants.as_ref())? {
             budget.hold(TARGET * group.home().targets)?;
             budget.spend(TARGET_WORK * group.home().targets as u64)?;
-            let material = match group.look().material {
-                Some(source) => Some(match materials.get(&source) {
-                    Some(copy) => *copy,
-                    None => {
-                        let copy = copy_material(self, &mut out, source)?;
-                        materials.insert(source, copy);
-                        copy
+            let look = match &variants {
+                Some(variants) => {
+                    let choices = variants.choices(self, group.look());
+                    let made = materials.make(&mut out, &choices, group.hatch())?;
+                    PrimitiveLook {
+                        material: made.default,
+                        extensions: Some(variants.mappings(&made, budget)?),
                     }
-                }),
-                None => None,
+                }
+                None => PrimitiveLook {
+                    material: materials.blended(&mut out, group.look().material)?,
+                    extensions: None,
+                },
             };
-            group.append(&mut out, material);
+            group.append(&mut out, &look);
+        }
+        if let (Some(variants), false) = (&variants, patches.is_empty()) {
+            variants.append(&mut out);
         }
         budget.check_output(self.bytes.len() + out.appended_bytes())?;
         let mended = out.finish()?;
@@ -75,16 +83,32 @@ impl Scan {
     fn groups<'s>(
         &'s self,
         patches: &'s [PatchPrimitive],
+        variants: Option<&Variants>,
     ) -> Result<Vec<PatchGroup<'s>>, ScanError> {
         let mut groups: Vec<PatchGroup<'_>> = Vec::new();
         let mut group_of = BTreeMap::new();
+        // Numbers of materials, of which a primitive may have many: by themselves, and by the primitives that have them.
+        let mut same: BTreeMap<MaterialChoices, usize> = BTreeMap::new();
+        let mut of_primitive: BTreeMap<(usize, usize), usize> = BTreeMap::new();
         for (index, patch) in patches.iter().enumerate() {
             let checked = CheckedPatch::new(self, patch, index)?;
-            let known = *group_of.entry(checked.kind()).or_insert(groups.len());
+            let look = checked.look;
+            let materials = of_primitive
+                .entry((look.mesh, look.primitive))
+                .or_insert_with(|| {
+                    let choices = match variants {
+                        Some(variants) => variants.choices(self, look),
+                        None => MaterialChoices::of(look),
+                    };
+                    let next = same.len();
+                    *same.entry(choices).or_insert(next)
+                });
+            let kind = checked.kind(*materials);
+            let known = *group_of.entry(kind.clone()).or_insert(groups.len());
             match groups.get_mut(known) {
                 Some(group) if group.takes(&checked) => group.push(checked),
                 _ => {
-                    group_of.insert(checked.kind(), groups.len());
+                    group_of.insert(kind, groups.len());
                     groups.push(PatchGroup::of(checked));
                 }
             }

@@ -1,0 +1,203 @@
+//! Materials of patches: copies of the scan's that are marked as reconstructions, and others that show it.
+//!
+//! A patch blends in by default. In the variant that marks it, its cloth is dark and bluish, and bright stripes glow on it:
+//! they are seen on any cloth, whatever its colours and the light, and by people with any colour vision. No material of
+//! the scan itself changes.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Map, Value, json};
+
+use super::append::Appender;
+use super::error::ScanError;
+use super::hatch;
+use super::scan::Scan;
+use super::variants::{MaterialChoices, PatchMaterials};
+
+const RECONSTRUCTION: &str = "darn reconstruction";
+
+/// What is left of the cloth's own light where a patch is marked: red, green, blue, opacity.
+const DARKENED: [f64; 4] = [0.25, 0.35, 0.5, 1.0];
+/// The light of a marked patch that has no room for the hatch's texture coordinates: half of its orange.
+const GLOW: [f64; 3] = [0.39, 0.17, 0.0];
+/// Extensions in which a material does not glow, or as bright as it likes.
+const WITHOUT_GLOW: [&str; 2] = ["KHR_materials_unlit", "KHR_materials_emissive_strength"];
+
+/// Makes the materials of patches, each once.
+pub(super) struct PatchMaterialsMaker<'s> {
+    scan: &'s Scan,
+    blended: BTreeMap<Option<usize>, usize>,
+    /// By the material and the set of texture coordinates of the hatch.
+    marked: BTreeMap<(Option<usize>, Option<usize>), usize>,
+    /// The texture of the hatch, once it is appended.
+    hatch: Option<usize>,
+}
+
+impl<'s> PatchMaterialsMaker<'s> {
+    /// Nothing made yet.
+    pub fn new(scan: &'s Scan) -> Self {
+        Self {
+            scan,
+            blended: BTreeMap::new(),
+            marked: BTreeMap::new(),
+            hatch: None,
+        }
+    }
+
+    /// The materials of a patch beside cloth with these; `hatch` is its set of texture coordinates for the hatch.
+    ///
+    /// # Errors
+    /// [`ScanError::Invalid`] for a material of the scan that is missing or no object.
+    pub fn make(
+        &mut self,
+        out: &mut Appender<'_>,
+        choices: &MaterialChoices,
+        hatch: Option<usize>,
+    ) -> Result<PatchMaterials, ScanError> {
+        let default = self.blended(out, choices.default)?;
+        let mapped = choices.mapped.iter().map(|(variant, material)| {
+            let copy = self.blended(out, Some(*material))?;
+            Ok((*variant, copy))
+        });
+        let mapped = mapped.collect::<Result<_, ScanError>>()?;
+        let marked = match choices.marked {
+            Some(marked) => marked,
+            None => self.marked(out, choices.default, hatch)?,
+        };
+        Ok(PatchMaterials {
+            default,
+            mapped,
+            marked,
+        })
+    }
+
+    /// A copy of a material that looks like it. A material that is a patch's already is used as it is.
+    pub fn blended(
+        &mut self,
+        out: &mut Appender<'_>,
+        source: Option<usize>,
+    ) -> Result<usize, ScanError> {
+        if let Some(known) = self.blended.get(&source) {
+            return Ok(*known);
+        }
+        let mut copy = self.source(source)?;
+        let own = is_reconstruction(&copy);
+        let made = match (source, own) {
+            (Some(source), true) => source,
+            _ => {
+                mark(&mut copy, RECONSTRUCTION, &["reconstructed"]);
+                out.push("materials", Value::Object(copy))
+            }
+        };
+        self.blended.insert(source, made);
+        Ok(made)
+    }
+
+    fn marked(
+        &mut self,
+        out: &mut Appender<'_>,
+        source: Option<usize>,
+        hatch: Option<usize>,
+    ) -> Result<usize, ScanError> {
+        if let Some(known) = self.marked.get(&(source, hatch)) {
+            return Ok(*known);
+        }
+        let mut copy = self.source(source)?;
+        let name = format!("{RECONSTRUCTION}, marked");
+        mark(&mut copy, &name, &["reconstructed", "marked"]);
+        if let Some(extensions) = object(&mut copy, "extensions") {
+            WITHOUT_GLOW
+                .iter()
+                .for_each(|name| drop(extensions.shift_remove(*name)));
+            if let Some(other) = object(extensions, "KHR_materials_pbrSpecularGlossiness") {
+                darken(other, "diffuseFactor");
+            }
+            if extensions.is_empty() {
+                copy.shift_remove("extensions");
+            }
+        }
+        let plain = copy
+            .entry("pbrMetallicRoughness")
+            .or_insert_with(|| json!({}));
+        if let Some(plain) = plain.as_object_mut() {
+            darken(plain, "baseColorFactor");
+        }
+        match hatch {
+            Some(set) => {
+                let texture = json!({ "index": self.hatch(out), "texCoord": set });
+                copy.insert("emissiveTexture".into(), texture);
+                copy.insert("emissiveFactor".into(), json!([1.0, 1.0, 1.0]));
+            }
+            None => {
+                copy.shift_remove("emissiveTexture");
+                copy.insert("emissiveFactor".into(), json!(GLOW));
+            }
+        }
+        let made = out.push("materials", Value::Object(copy));
+        self.marked.insert((source, hatch), made);
+        Ok(made)
+    }
+
+    /// The texture of the hatch; it repeats, as textures do without a sampler.
+    fn hatch(&mut self, out: &mut Appender<'_>) -> usize {
+        *self.hatch.get_or_insert_with(|| {
+            let view = out.view("darn hatch", hatch::PNG);
+            let image =
+                json!({ "name": "darn hatch", "bufferView": view, "mimeType": "image/png" });
+            let image = out.push("images", image);
+            out.push("textures", json!({ "name": "darn hatch", "source": image }))
+        })
+    }
+
+    /// A copy of a material of the scan; without one, glTF's default.
+    fn source(&self, source: Option<usize>) -> Result<Map<String, Value>, ScanError> {
+        let Some(source) = source else {
+            return Ok(Map::new());
+        };
+        let pointer = format!("/materials/{source}");
+        let material = self.scan.json.pointer(&pointer).and_then(Value::as_object);
+        material.cloned().ok_or_else(|| ScanError::Invalid {
+            pointer,
+            detail: "must be an object".into(),
+        })
+    }
+}
+
+fn is_reconstruction(material: &Map<String, Value>) -> bool {
+    let darn = material.get("extras").and_then(|extras| extras.get("darn"));
+    darn.and_then(|darn| darn.get("reconstructed")) == Some(&Value::Bool(true))
+}
+
+/// Names a material after what it is, and sets flags in `extras.darn`. Extras that are not an object cannot take them; the
+/// primitive's extras have the first one, too.
+fn mark(material: &mut Map<String, Value>, what: &str, flags: &[&str]) {
+    let name = match material.get("name").and_then(Value::as_str) {
+        Some(name) => format!("{name} ({what})"),
+        None => what.into(),
+    };
+    material.insert("name".into(), name.into());
+    let extras = material.entry("extras").or_insert_with(|| json!({}));
+    let extras = extras.as_object_mut();
+    let darn = extras.map(|extras| extras.entry("darn").or_insert_with(|| json!({})));
+    if let Some(darn) = darn.and_then(Value::as_object_mut) {
+        for flag in flags {
+            darn.insert((*flag).into(), Value::Bool(true));
+        }
+    }
+}
+
+fn object<'m>(of: &'m mut Map<String, Value>, key: &str) -> Option<&'m mut Map<String, Value>> {
+    of.get_mut(key).and_then(Value::as_object_mut)
+}
+
+/// Multiplies a colour factor of four numbers, which are 1 if they are left out.
+fn darken(material: &mut Map<String, Value>, key: &str) {
+    let old = material.get(key).and_then(Value::as_array);
+    let channel = |k: usize| {
+        let old = old.and_then(|old| old.get(k)?.as_f64());
+        // Three digits: no reader needs more.
+        ((old.unwrap_or(1.0) * DARKENED[k]).clamp(0.0, 1.0) * 1000.0).round() / 1000.0
+    };
+    let factor = [channel(0), channel(1), channel(2), channel(3)];
+    material.insert(key.into(), json!(factor));
+}
