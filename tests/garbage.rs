@@ -1,6 +1,7 @@
 //! Hostile and broken scans: reading them never panics, never exceeds the memory limits, and reports where the error is.
 
-use darn_gltf_scan::{Scan, ScanError, ScanLimits};
+use darn_budget::Budget;
+use darn_gltf_scan::{Scan, ScanError, ScanLimits, stripped};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
@@ -69,6 +70,11 @@ fn read_and_write(bytes: &[u8]) -> Result<(), ScanError> {
         max_faces: 10_000,
         ..ScanLimits::default()
     };
+    // Whatever they are, nothing of darn's is in them.
+    let stripped = stripped(bytes.to_vec(), &limits, Budget::unlimited());
+    assert!(
+        stripped.is_ok_and(|found| found.is_none()) || Scan::read(bytes.to_vec(), &limits).is_err()
+    );
     let scan = Scan::read(bytes.to_vec(), &limits)?;
     assert!(
         scan.surface.positions.len() <= limits.max_vertices

@@ -3,6 +3,7 @@
 use super::failure::{Failure, OrFail};
 use crate::settings::SizeArgs;
 use darn_budget::Budget;
+use darn_contract::v1::FileDigests;
 use darn_gltf_scan::{Scan, Siblings, sibling_paths};
 use std::collections::BTreeMap;
 use std::fs;
@@ -45,13 +46,15 @@ fn siblings(gltf: &Path, paths: Vec<String>) -> Result<Siblings, Failure> {
 
 /// Writes a mended scan: as a GLB with all its files if the output's name ends so, else in the container it was read from.
 ///
-/// A glTF written into another folder takes its files there; a file that is there already stays.
-pub fn write_scan(path: &Path, scan: &Scan, mended: &[u8]) -> Result<(), Failure> {
+/// A glTF written into another folder takes its files there; a file that is there already stays. Returns the digests of a GLB
+/// that was packed here.
+pub fn write_scan(path: &Path, scan: &Scan, mended: &[u8]) -> Result<Option<FileDigests>, Failure> {
     let writing = || format!("write {}", path.display());
     let extension = path.extension().unwrap_or_default();
     if extension.eq_ignore_ascii_case("glb") {
         let packed = scan.packed(mended).or_fail(writing())?;
-        return write(path, &packed);
+        write(path, &packed)?;
+        return Ok(Some(darn_mend::file_digests(&packed)));
     }
     write(path, mended)?;
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -63,7 +66,7 @@ pub fn write_scan(path: &Path, scan: &Scan, mended: &[u8]) -> Result<(), Failure
             write(&place, bytes)?;
         }
     }
-    Ok(())
+    Ok(None)
 }
 
 /// Writes a file beside its target and renames it, so that no reader sees a part of it.

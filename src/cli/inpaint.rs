@@ -5,6 +5,7 @@ use super::files;
 use super::holes::{kind_name, set_aside};
 use super::network::mender;
 use super::progress::WorkProgress;
+use super::provenance;
 use crate::settings::{DeadlineArgs, NetworkArgs, SizeArgs};
 use darn_contract::v1::{HoleReport, Report};
 use darn_contract::{Constraints, FieldError};
@@ -25,6 +26,12 @@ pub struct InpaintArgs {
     /// Where the report goes, as JSON
     #[arg(long)]
     report: Option<PathBuf>,
+    /// Where the provenance of the mend goes, as linked data (CRMdig and PREMIS in JSON-LD)
+    #[arg(long, value_name = "FILE")]
+    provenance: Option<PathBuf>,
+    /// When the mend is said to be, in the provenance; left out, it has no date
+    #[arg(long, requires = "provenance", value_parser = provenance::date)]
+    date: Option<String>,
     #[command(flatten)]
     size: SizeArgs,
     #[command(flatten)]
@@ -56,15 +63,50 @@ pub fn run(args: &InpaintArgs) -> Result<(), Failure> {
     let mut mended = darn_mend::mend(&scan, &constraints, call).or_fail(format!("mend {name}"))?;
     darn_mend::add_read_time(&mut mended.report.timings, read);
     progress.stage("writing");
-    files::write_scan(&args.output, &scan, &mended.bytes)?;
+    if let Some(packed) = files::write_scan(&args.output, &scan, &mended.bytes)? {
+        mended.report.output = Some(packed);
+    }
+    let mut report = serde_json::to_vec_pretty(&mended.report).or_fail("write the report")?;
+    report.push(b'\n');
     if let Some(path) = &args.report {
-        let mut json = serde_json::to_vec_pretty(&mended.report).or_fail("write the report")?;
-        json.push(b'\n');
-        files::write(path, &json)?;
+        files::write(path, &report)?;
+    }
+    if let Some(path) = &args.provenance {
+        write_provenance(path, args, (&mended.report, &report))?;
     }
     drop(progress);
     print!("{}", summary(&mended.report));
     Ok(())
+}
+
+/// Writes the provenance of a mend; also takes its report as it was written.
+fn write_provenance(
+    path: &Path,
+    args: &InpaintArgs,
+    (report, text): (&Report, &[u8]),
+) -> Result<(), Failure> {
+    let name = |path: &Path| {
+        path.file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
+    };
+    let constraints = match &args.constraints {
+        Some(path) => files::read(path)?,
+        None => b"{}".to_vec(),
+    };
+    let log = args.report.as_deref().map(name);
+    let document = provenance::document(&provenance::Mend {
+        report,
+        input: &name(&args.scan),
+        output: &name(&args.output),
+        constraints: &constraints,
+        log: log.as_deref().map(|log| (log, text)),
+        date: args.date.as_deref(),
+    });
+    let mut json = serde_json::to_vec_pretty(&document).or_fail("write the provenance")?;
+    json.push(b'\n');
+    files::write(path, &json)
 }
 
 /// The constraints in a file; invalid ones are wrong usage.

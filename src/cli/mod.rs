@@ -19,6 +19,7 @@ mod network;
 mod openapi;
 mod optimize_anchor;
 mod progress;
+mod provenance;
 mod render;
 #[cfg(feature = "burn")]
 mod samples;

@@ -1,6 +1,7 @@
 //! The service with its real router on a real socket, around a fake mender that behaves as each test says.
 
 mod anchors;
+mod digests;
 mod editor;
 mod every_request;
 mod fake;

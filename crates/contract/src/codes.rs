@@ -62,6 +62,8 @@ codes! {
     EMPTY_BODY = "empty_body", 400, InvalidArgument;
     /// The request cannot be read.
     MALFORMED_REQUEST = "malformed_request", 400, InvalidArgument;
+    /// The body is not the one that its digest tells of.
+    DIGEST_MISMATCH = "digest_mismatch", 400, InvalidArgument;
     /// An anchor search came without its query.
     NO_QUERY = "no_query", 400, InvalidArgument;
     /// No such path.

@@ -14,7 +14,7 @@ use std::panic::catch_unwind;
 use std::time::{Duration, Instant};
 
 use darn_budget::{Budget, Limits};
-use darn_gltf_scan::{Scan, ScanLimits};
+use darn_gltf_scan::{Scan, ScanLimits, stripped};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
@@ -109,6 +109,7 @@ fn reads(bytes: &[u8]) -> bool {
         ..Limits::default()
     };
     let budget = Budget::new(budget, &|| false);
+    drop(stripped(bytes.to_vec(), &limits, &budget));
     let scan = Scan::read_within(bytes.to_vec(), &limits, &budget);
     scan.is_ok_and(|scan| scan.write(&[]).is_ok())
 }

@@ -10,6 +10,7 @@ use serde_json::{Map, Value, json};
 use super::buffers::BufferTarget;
 use super::compressed::meshopt;
 use super::container::{Container, pack_glb, too_long};
+use super::digests::sha256;
 use super::error::ScanError;
 use super::json_edit::JsonEdit;
 use super::scan::Scan;
@@ -33,6 +34,8 @@ pub(super) struct Appender<'s> {
     /// Whether that buffer is the BIN chunk; if not, it is a new data URI.
     in_bin: bool,
     data: Vec<u8>,
+    /// The SHA-256 of the scan, in hexadecimal.
+    sha256: String,
 }
 
 /// The values of a new accessor.
@@ -106,7 +109,13 @@ impl<'s> Appender<'s> {
             start,
             in_bin,
             data: Vec::new(),
+            sha256: sha256(&scan.bytes),
         }
+    }
+
+    /// The SHA-256 of the scan, in hexadecimal.
+    pub fn sha256(&self) -> &str {
+        &self.sha256
     }
 
     /// Appends to the list `key` at the top of the JSON; returns the new element's index.
@@ -123,10 +132,17 @@ impl<'s> Appender<'s> {
     }
 
     /// Appends to a list of an extension at the top of the JSON, which is created if it is missing; what is there must be
-    /// objects and a list.
-    pub fn push_to_extension(&mut self, extension: &'static str, list: &'static str, value: Value) {
-        let lists = &mut self.extensions;
-        lists.entry((extension, list)).or_default().push(value);
+    /// objects and a list ([`extension_list`]). Returns the new element's index.
+    pub fn push_to_extension(
+        &mut self,
+        extension: &'static str,
+        list: &'static str,
+        value: Value,
+    ) -> usize {
+        let old = extension_list(&self.scan.json, extension, list).map_or(0, <[Value]>::len);
+        let new = self.extensions.entry((extension, list)).or_default();
+        new.push(value);
+        old + new.len() - 1
     }
 
     /// Lists an extension as used.
@@ -235,7 +251,7 @@ impl<'s> Appender<'s> {
         for (key, values) in &self.lists {
             edit.append(&[key], values)?;
         }
-        let text = undo::with_record(self.scan, edit.finish())?.into_bytes();
+        let text = undo::with_record(self.scan, &self.sha256, edit.finish())?.into_bytes();
         if layout.container == Container::Gltf {
             let head = bytes.get(..layout.json.start).unwrap_or_default();
             return Ok([head, &text].concat());
@@ -286,6 +302,27 @@ impl Appender<'_> {
             edit.set(&["extensions", extension], &json!(lists))?;
         }
         Ok(())
+    }
+}
+
+/// A list of an extension at the top of a JSON, empty where it is missing; `None` where there is something else, so that it
+/// cannot be appended to.
+pub(super) fn extension_list<'j>(
+    json: &'j Value,
+    extension: &str,
+    list: &str,
+) -> Option<&'j [Value]> {
+    let used = json.get("extensionsUsed");
+    used.is_none_or(Value::is_array).then_some(())?;
+    let Some(all) = json.get("extensions") else {
+        return Some(&[]);
+    };
+    let Some(own) = all.as_object()?.get(extension) else {
+        return Some(&[]);
+    };
+    match own.as_object()?.get(list) {
+        Some(list) => list.as_array().map(Vec::as_slice),
+        None => Some(&[]),
     }
 }
 

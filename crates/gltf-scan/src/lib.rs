@@ -22,6 +22,7 @@ mod compressed_tests;
 mod container;
 mod content;
 mod cut;
+mod digests;
 mod error;
 pub mod export;
 mod files;
@@ -58,11 +59,15 @@ mod variants_tests;
 mod write;
 #[cfg(test)]
 mod write_tests;
+mod xmp;
+#[cfg(test)]
+mod xmp_tests;
 mod zip_files;
 mod zip_undo;
 
 pub use container::Container;
 pub use content::SceneContent;
+pub use digests::FileDigests;
 pub use error::ScanError;
 pub use files::{Siblings, sibling_paths};
 pub use left_out::NamedPlace;
@@ -72,3 +77,4 @@ pub use patch_primitive::{PatchPoint, PatchPrimitive};
 pub use scan::{Scan, ScanPart};
 pub use strip::{Stripped, stripped};
 pub use unmarked::Marks;
+pub use write::WrittenScan;

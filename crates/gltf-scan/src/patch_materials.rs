@@ -13,11 +13,12 @@ use super::error::ScanError;
 use super::hatch;
 use super::scan::Scan;
 use super::variants::{MaterialChoices, PatchMaterials};
+use super::xmp;
 
 const RECONSTRUCTION: &str = "darn reconstruction";
 
 /// What is left of the cloth's own light where a patch is marked: red, green, blue, opacity.
-const DARKENED: [f64; 4] = [0.25, 0.35, 0.5, 1.0];
+const DARKENED: [f64; 4] = [0.1, 0.16, 0.28, 1.0];
 /// The light of a marked patch that has no room for the hatch's texture coordinates: half of its orange.
 const GLOW: [f64; 3] = [0.39, 0.17, 0.0];
 /// Extensions in which a material does not glow, or as bright as it likes.
@@ -31,16 +32,19 @@ pub(super) struct PatchMaterialsMaker<'s> {
     marked: BTreeMap<(Option<usize>, Option<usize>), usize>,
     /// The texture of the hatch, once it is appended.
     hatch: Option<usize>,
+    /// The packet of metadata that they refer to.
+    packet: Option<usize>,
 }
 
 impl<'s> PatchMaterialsMaker<'s> {
-    /// Nothing made yet.
-    pub fn new(scan: &'s Scan) -> Self {
+    /// Nothing made yet; all materials that are made refer to the packet of metadata.
+    pub fn new(scan: &'s Scan, packet: Option<usize>) -> Self {
         Self {
             scan,
             blended: BTreeMap::new(),
             marked: BTreeMap::new(),
             hatch: None,
+            packet,
         }
     }
 
@@ -86,6 +90,7 @@ impl<'s> PatchMaterialsMaker<'s> {
             (Some(source), true) => source,
             _ => {
                 mark(&mut copy, RECONSTRUCTION, &["reconstructed"]);
+                self.refer(&mut copy);
                 out.push("materials", Value::Object(copy))
             }
         };
@@ -133,9 +138,21 @@ impl<'s> PatchMaterialsMaker<'s> {
                 copy.insert("emissiveFactor".into(), json!(GLOW));
             }
         }
+        self.refer(&mut copy);
         let made = out.push("materials", Value::Object(copy));
         self.marked.insert((source, hatch), made);
         Ok(made)
+    }
+
+    /// Lets a material refer to the packet of metadata.
+    fn refer(&self, material: &mut Map<String, Value>) {
+        let Some(packet) = self.packet else {
+            return;
+        };
+        let extensions = material.entry("extensions").or_insert_with(|| json!({}));
+        if let Some(extensions) = extensions.as_object_mut() {
+            extensions.insert(xmp::EXTENSION.into(), xmp::reference(packet));
+        }
     }
 
     /// The texture of the hatch; it repeats, as textures do without a sampler.

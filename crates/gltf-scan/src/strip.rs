@@ -10,6 +10,7 @@ use serde_json::Value;
 
 use super::compressed::DecodeAllowance;
 use super::container::{self, Container};
+use super::digests::FileDigests;
 use super::error::ScanError;
 use super::limits::ScanLimits;
 use super::read::parsed_json;
@@ -37,6 +38,10 @@ pub struct Stripped {
     pub marks: Marks,
     /// What a person should know.
     pub notes: Vec<String>,
+    /// Of the glTF that came: the file, or the glTF in a zip.
+    pub input: FileDigests,
+    /// Of the glTF without what darn did to it, likewise.
+    pub output: FileDigests,
 }
 
 /// Takes everything out of a scan that darn put in. Files beside a glTF are not needed. `None` if there is nothing of
@@ -64,6 +69,7 @@ fn stripped_file(
     budget: &Budget<'_>,
 ) -> Result<Option<Stripped>, ScanError> {
     let container = container::layout(&bytes)?.container;
+    let input = FileDigests::of(&bytes);
     let marks = Marks::of(&json_of(&bytes, limits, budget)?);
     let mut mends = 0;
     let mut notes = Vec::new();
@@ -99,12 +105,14 @@ fn stripped_file(
         }
     };
     Ok(Some(Stripped {
+        output: FileDigests::of(&bytes),
         bytes,
         container,
         exact,
         mends,
         marks,
         notes,
+        input,
     }))
 }
 
@@ -120,10 +128,9 @@ fn stripped_zip(
 ) -> Result<Option<Stripped>, ScanError> {
     let (limits, budget) = (allowance.limits, allowance.budget);
     let mut zip = ZipFiles::open(bytes.clone())?;
-    let marks = {
-        let main = zip.main(allowance)?;
-        Marks::of(&json_of(&main, limits, budget)?)
-    };
+    let main = zip.main(allowance)?;
+    let marks = Marks::of(&json_of(&main, limits, budget)?);
+    let input = FileDigests::of(&main);
     let mut mends = 0;
     while let Some(before) = zip.before(allowance)? {
         budget.spend_at_once(BYTE_WORK * bytes.len() as u64)?;
@@ -131,7 +138,8 @@ fn stripped_zip(
         zip = ZipFiles::open(bytes.clone())?;
         mends += 1;
     }
-    let inner = stripped_file(zip.main(allowance)?, limits, budget)?;
+    let main = zip.main(allowance)?;
+    let inner = stripped_file(main.clone(), limits, budget)?;
     let stripped = match inner {
         None if mends == 0 => return Ok(None),
         None => Stripped {
@@ -141,6 +149,8 @@ fn stripped_zip(
             mends,
             marks,
             notes: Vec::new(),
+            input,
+            output: FileDigests::of(&main),
         },
         Some(mut inner) => {
             if inner.exact {
@@ -151,6 +161,7 @@ fn stripped_zip(
                 container: Container::Zip,
                 mends: mends + inner.mends,
                 marks,
+                input,
                 ..inner
             }
         }

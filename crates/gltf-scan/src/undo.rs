@@ -13,9 +13,9 @@
 //! mended several times has a record of each time, and the last one is undone first.
 
 use serde_json::{Value, json};
-use sha2::{Digest as _, Sha256};
 
 use super::container::{self, Container, ContainerLayout};
+use super::digests::sha256;
 use super::error::ScanError;
 use super::json_edit::{EditedText, JsonEdit};
 use super::scan::Scan;
@@ -32,11 +32,15 @@ pub(super) fn extras() -> Value {
     json!({ "darn": { "undo": PLACEHOLDER } })
 }
 
-/// An edited text with the record of its edits in place of the [`PLACEHOLDER`].
+/// An edited text with the record of its edits in place of the [`PLACEHOLDER`]; `digest` is the scan's SHA-256.
 ///
 /// # Errors
 /// [`ScanError::Invalid`] where the placeholder is missing.
-pub(super) fn with_record(scan: &Scan, edited: EditedText) -> Result<String, ScanError> {
+pub(super) fn with_record(
+    scan: &Scan,
+    digest: &str,
+    edited: EditedText,
+) -> Result<String, ScanError> {
     let (bytes, layout) = (&scan.bytes, &scan.layout);
     let edits = edited.splices.into_iter().map(|splice| {
         let mut edit = vec![json!(splice.at), json!(splice.inserted)];
@@ -46,7 +50,7 @@ pub(super) fn with_record(scan: &Scan, edited: EditedText) -> Result<String, Sca
         Value::Array(edit)
     });
     let mut record = json!({
-        "sha256": sha256(bytes),
+        "sha256": digest,
         "json": layout.json.len(),
         "edits": edits.collect::<Vec<_>>(),
     });
@@ -179,10 +183,4 @@ fn zeros_after(bytes: &[u8], layout: &ContainerLayout) -> usize {
         _ => 0,
     };
     length.saturating_sub(layout.json.len())
-}
-
-/// The SHA-256 of bytes, in hexadecimal.
-pub(super) fn sha256(bytes: &[u8]) -> String {
-    let digest = Sha256::digest(bytes);
-    digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }

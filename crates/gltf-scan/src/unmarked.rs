@@ -9,6 +9,7 @@ use std::collections::BTreeSet;
 use serde_json::{Map, Value};
 
 use super::variants;
+use super::xmp;
 
 /// What a scan has of darn.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -68,6 +69,7 @@ pub(super) fn without_marks(json: &mut Value) -> Option<Vec<String>> {
     }
     remove_variants(json);
     remove_materials(json);
+    remove_packets(json);
     Some(notes)
 }
 
@@ -227,39 +229,103 @@ fn remove_variants(json: &mut Value) {
         }
     }
     let own = [variants::BLENDED, variants::MARKED];
-    let Some(extensions) = json.get_mut("extensions").and_then(Value::as_object_mut) else {
-        return;
+    let is_own = |variant: &Value| {
+        let name = variant.get("name").and_then(Value::as_str);
+        name.is_some_and(|name| own.contains(&name))
     };
-    let list = extensions
-        .get_mut(variants::EXTENSION)
-        .and_then(|it| it.get_mut("variants"));
-    let Some(list) = list.and_then(Value::as_array_mut) else {
-        return;
+    let left = remove_last(
+        json,
+        (variants::EXTENSION, variants::VARIANTS),
+        |index, variant| is_own(variant) && !mapped.contains(&index),
+    );
+    if left == Some(0) && !is_used {
+        remove_extension(json, variants::EXTENSION);
+    }
+}
+
+/// Removes darn's packets of metadata from the end of the list, as far as nothing else refers to them.
+fn remove_packets(json: &mut Value) {
+    let packets = json.pointer(&format!("/extensions/{}/{}", xmp::EXTENSION, xmp::PACKETS));
+    let packets = packets
+        .and_then(Value::as_array)
+        .map_or(&[][..], Vec::as_slice);
+    let own: BTreeSet<u64> = (0..)
+        .zip(packets)
+        .filter(|(_, it)| xmp::is_own(it))
+        .map(|(k, _)| k)
+        .collect();
+    let packet = |of: &Value| {
+        of.get("extensions")?
+            .get(xmp::EXTENSION)?
+            .get("packet")?
+            .as_u64()
     };
+    if let Some(asset) = json.get_mut("asset")
+        && packet(asset).is_some_and(|packet| own.contains(&packet))
+        && let Some(asset) = asset.as_object_mut()
+    {
+        remove_own_extension(asset, xmp::EXTENSION);
+    }
+    const MAY_REFER: [&str; 6] = [
+        "scenes",
+        "nodes",
+        "meshes",
+        "materials",
+        "images",
+        "animations",
+    ];
+    let lists = MAY_REFER
+        .iter()
+        .filter_map(|key| json.get(*key)?.as_array());
+    let mut used: BTreeSet<u64> = lists.flatten().filter_map(packet).collect();
+    used.extend(json.get("asset").and_then(packet));
+    let left = remove_last(json, (xmp::EXTENSION, xmp::PACKETS), |index, packet| {
+        xmp::is_own(packet) && !used.contains(&index)
+    });
+    if left == Some(0) && used.is_empty() {
+        remove_extension(json, xmp::EXTENSION);
+    }
+}
+
+/// Removes elements from the end of a list of an extension while `goes` says so; returns how many are left.
+fn remove_last(
+    json: &mut Value,
+    (extension, list): (&str, &str),
+    goes: impl Fn(u64, &Value) -> bool,
+) -> Option<usize> {
+    let list = json.pointer_mut(&format!("/extensions/{extension}/{list}"))?;
+    let list = list.as_array_mut()?;
     while let Some(last) = list.last() {
-        let name = last.get("name").and_then(Value::as_str);
-        let is_own = name.is_some_and(|name| own.contains(&name));
-        if !is_own || mapped.contains(&(list.len() as u64 - 1)) {
+        if !goes(list.len() as u64 - 1, last) {
             break;
         }
         list.pop();
     }
-    if !list.is_empty() || is_used {
-        return;
-    }
-    extensions.shift_remove(variants::EXTENSION);
-    let emptied = extensions.is_empty();
+    Some(list.len())
+}
+
+/// Removes an extension that nothing uses any more from the top of the JSON.
+fn remove_extension(json: &mut Value, name: &str) {
     let Some(root) = json.as_object_mut() else {
         return;
     };
-    if emptied {
-        root.shift_remove("extensions");
-    }
+    remove_own_extension(root, name);
     if let Some(used) = root.get_mut("extensionsUsed").and_then(Value::as_array_mut) {
-        used.retain(|name| name != variants::EXTENSION);
+        used.retain(|used| used != name);
         if used.is_empty() {
             root.shift_remove("extensionsUsed");
         }
+    }
+}
+
+/// Removes an extension of an object, and the object's `extensions` if that leaves none.
+fn remove_own_extension(object: &mut Map<String, Value>, name: &str) {
+    let Some(extensions) = object.get_mut("extensions").and_then(Value::as_object_mut) else {
+        return;
+    };
+    extensions.shift_remove(name);
+    if extensions.is_empty() {
+        object.shift_remove("extensions");
     }
 }
 

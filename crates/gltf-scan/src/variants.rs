@@ -8,12 +8,14 @@ use std::collections::BTreeMap;
 use darn_budget::Budget;
 use serde_json::{Value, json};
 
-use super::append::Appender;
+use super::append::{Appender, extension_list};
 use super::error::ScanError;
 use super::scan::{Scan, ScanPart};
 
 /// Name of the extension.
 pub(super) const EXTENSION: &str = "KHR_materials_variants";
+/// Name of its list.
+pub(super) const VARIANTS: &str = "variants";
 /// Name of the variant in which patches look like the cloth. Viewers look for a part of a name, so neither of the two is part
 /// of the other.
 pub(super) const BLENDED: &str = "Reconstruction blended";
@@ -71,20 +73,7 @@ pub(super) struct Variants {
 impl Variants {
     /// The scan's variants, and places for darn's own; `None` if the scan uses the extension in a way that cannot be added to.
     pub fn of(scan: &Scan) -> Option<Self> {
-        let names = match scan.json.get("extensions") {
-            None => &[][..],
-            Some(extensions) => match extensions.as_object()?.get(EXTENSION) {
-                None => &[][..],
-                Some(extension) => extension.get("variants")?.as_array()?.as_slice(),
-            },
-        };
-        if scan
-            .json
-            .get("extensionsUsed")
-            .is_some_and(|used| !used.is_array())
-        {
-            return None;
-        }
+        let names = extension_list(&scan.json, EXTENSION, VARIANTS)?;
         let place = |own: &str, new: usize| {
             let known = names
                 .iter()
@@ -106,7 +95,7 @@ impl Variants {
         out.uses(EXTENSION);
         for (index, name) in [(self.blended, BLENDED), (self.marked, MARKED)] {
             if index >= self.count {
-                out.push_to_extension(EXTENSION, "variants", json!({ "name": name }));
+                out.push_to_extension(EXTENSION, VARIANTS, json!({ "name": name }));
             }
         }
     }

@@ -7,6 +7,7 @@ use darn_budget::Budget;
 use super::append::Appender;
 use super::checked_patch::CheckedPatch;
 use super::cut::cut_primitives;
+use super::digests::FileDigests;
 use super::error::ScanError;
 use super::files::Companions;
 use super::patch_group::{PatchGroup, PrimitiveLook};
@@ -14,6 +15,16 @@ use super::patch_materials::PatchMaterialsMaker;
 use super::patch_primitive::PatchPrimitive;
 use super::scan::Scan;
 use super::variants::{MaterialChoices, Variants};
+use super::xmp;
+
+/// A scan with patches.
+#[derive(Debug, Clone)]
+pub struct WrittenScan {
+    /// In the container it was read from.
+    pub bytes: Vec<u8>,
+    /// Of the glTF: the file, or the glTF in a zip.
+    pub digests: FileDigests,
+}
 
 impl Scan {
     /// The scan with patches appended, in the container it was read from. Without patches and cuts: the bytes that were
@@ -26,7 +37,8 @@ impl Scan {
     /// [`ScanError::InvalidPatch`] for a patch that contradicts itself or the scan, [`ScanError::Singular`] for one on
     /// a node whose transform is singular.
     pub fn write(&self, patches: &[PatchPrimitive]) -> Result<Vec<u8>, ScanError> {
-        self.write_within(patches, Budget::unlimited())
+        let written = self.write_within(patches, Budget::unlimited())?;
+        Ok(written.bytes)
     }
 
     /// [`Scan::write`] within a request's budget.
@@ -37,18 +49,26 @@ impl Scan {
         &self,
         patches: &[PatchPrimitive],
         budget: &Budget,
-    ) -> Result<Vec<u8>, ScanError> {
+    ) -> Result<WrittenScan, ScanError> {
+        budget.spend(DIGEST_WORK * self.bytes.len() as u64)?;
         if patches.is_empty() && self.cut.is_empty() {
             let bytes = match &self.companions {
                 Companions::Zip(zip) => &zip.bytes,
                 _ => &self.bytes,
             };
-            return Ok(bytes.to_vec());
+            return Ok(WrittenScan {
+                bytes: bytes.to_vec(),
+                digests: self.digests(),
+            });
         }
         let mut out = Appender::new(self);
         cut_primitives(self, &mut out)?;
         let variants = Variants::of(self);
-        let mut materials = PatchMaterialsMaker::new(self);
+        let packet = match patches.len() {
+            0 => None,
+            holes => xmp::append_packet(self, &mut out, holes),
+        };
+        let mut materials = PatchMaterialsMaker::new(self, packet);
         for group in self.groups(patches, variants.as_ref())? {
             budget.hold(TARGET * group.home().targets)?;
             budget.spend(TARGET_WORK * group.home().targets as u64)?;
@@ -73,10 +93,18 @@ impl Scan {
         }
         budget.check_output(self.bytes.len() + out.appended_bytes())?;
         let mended = out.finish()?;
-        match &self.companions {
-            Companions::Zip(zip) => zip.with_main(&mended),
-            _ => Ok(mended),
-        }
+        budget.spend(DIGEST_WORK * mended.len() as u64)?;
+        let digests = FileDigests::of(&mended);
+        let bytes = match &self.companions {
+            Companions::Zip(zip) => zip.with_main(&mended)?,
+            _ => mended,
+        };
+        Ok(WrittenScan { bytes, digests })
+    }
+
+    /// The digests of the glTF as it was read: the file, or the glTF in a zip.
+    pub fn digests(&self) -> FileDigests {
+        FileDigests::of(&self.bytes)
     }
 
     /// The patches by the primitive that they share, in the order of each primitive's first patch.
@@ -119,5 +147,7 @@ impl Scan {
 
 /// Bytes of memory of a morph target of a patch, as JSON and as text.
 const TARGET: usize = 300;
+/// Nanoseconds of work a byte whose digests are made.
+const DIGEST_WORK: u64 = 8;
 /// Nanoseconds of work a morph target of a patch.
 const TARGET_WORK: u64 = 300;

@@ -7,8 +7,8 @@
 use serde_json::{Value, json};
 
 use super::compressed::DecodeAllowance;
+use super::digests::sha256;
 use super::error::ScanError;
-use super::undo::sha256;
 use super::zip_files::ZipFiles;
 
 /// Nanoseconds of work a byte that is copied and checked.

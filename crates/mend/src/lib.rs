@@ -24,6 +24,7 @@ mod cut;
 mod cut_faces;
 #[cfg(test)]
 mod defect_tests;
+mod digests;
 mod doubts;
 mod edit;
 mod error;
@@ -64,6 +65,7 @@ use darn_contract::{Anchor, Constraints, Search, v1};
 use darn_gltf_scan::Scan;
 
 pub use call_pools::CallPools;
+pub use digests::file_digests;
 pub use edit::SearchOptions;
 pub use error::MendError;
 pub use limits::{EditedFill, MendLimits};

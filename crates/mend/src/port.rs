@@ -11,6 +11,7 @@ use darn_contract::port::{
 use darn_contract::{Constraints, Search, error_chain, v1};
 use darn_gltf_scan::{Container, Scan, repacked};
 
+use crate::digests::file_digests;
 use crate::error::MendError;
 use crate::mender::{Call, NetworkMender};
 use crate::session::ScanSession;
@@ -70,10 +71,15 @@ impl Mender for SharedMender {
         let limits = &self.0.scan_limits;
         let (container, bytes) = repacked(mended.bytes, container, limits, budget)
             .map_err(|error| refusal(MendError::unreadable(error)))?;
+        let mut report = mended.report;
+        // The glTF of a zip is the same outside; packed with its files, it is another.
+        if form == ScanForm::Glb {
+            report.output = Some(file_digests(&bytes));
+        }
         Ok(Mended {
             bytes,
             media_type: container.media_type(),
-            report: mended.report,
+            report,
         })
     }
 

@@ -10,6 +10,7 @@ use crate::addition::PatchSource;
 use crate::border;
 use crate::context::HoleContext;
 use crate::cut::CutScan;
+use crate::digests;
 use crate::error::MendError;
 use crate::fill_hole::PatchDraft;
 use crate::hole_report::FilledHole;
@@ -243,14 +244,16 @@ impl ScanHoles {
         let additions = self.additions(scan, &filled, call.budget)?;
         let additions_ms = milliseconds(started);
         let started = Instant::now();
-        let bytes = self.seen(scan).write_within(&additions, call.budget)?;
+        let written = self.seen(scan).write_within(&additions, call.budget)?;
         let mut report = self.report(scan, filled);
+        report.input = Some(digests::message(scan.digests()));
+        report.output = Some(digests::message(written.digests));
         if let Some(timings) = &mut report.timings {
             timings.write = milliseconds(started);
             timings.total += additions_ms + timings.write;
         }
         Ok(Mended {
-            bytes,
+            bytes: written.bytes,
             media_type: scan.container().media_type(),
             report,
         })
@@ -284,6 +287,9 @@ impl ScanHoles {
         let holes_ms = self.prepare_ms + filled.fill_ms;
         let timings = self.welded.timings;
         v1::Report {
+            // Of what is not written there are none, and a session that shows patches has no time for them.
+            input: None,
+            output: None,
             version: VERSION.to_owned(),
             weights: Some(filled.inpainter.weights()),
             holes: filled.holes.into_iter().map(|h| h.report).collect(),

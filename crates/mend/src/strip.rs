@@ -7,6 +7,7 @@ use darn_contract::v1;
 use darn_gltf_scan::{Container, ScanLimits, repacked, stripped};
 
 use crate::VERSION;
+use crate::digests::{self, file_digests};
 use crate::error::MendError;
 
 /// Takes everything out of a scan that darn put in: a GLB; a glTF, whose other files are not needed; or a zip, which
@@ -22,13 +23,15 @@ pub fn strip(
 ) -> Result<Stripped, MendError> {
     let found = stripped(scan, limits, budget).map_err(MendError::unreadable)?;
     let found = found.ok_or(MendError::NothingToStrip)?;
-    let report = v1::StripReport {
+    let mut report = v1::StripReport {
         version: VERSION.to_owned(),
         exact: found.exact,
         mends: found.mends as u32,
         patches: found.marks.patches as u32,
         cuts: found.marks.cuts as u32,
         notes: found.notes,
+        input: Some(digests::message(found.input)),
+        output: Some(digests::message(found.output)),
     };
     let wanted = match form {
         _ if found.container != Container::Zip => found.container,
@@ -40,6 +43,9 @@ pub fn strip(
         true => (wanted, found.bytes),
         false => repacked(found.bytes, wanted, limits, budget).map_err(MendError::unreadable)?,
     };
+    if found.container == Container::Zip && wanted == Container::Glb {
+        report.output = Some(file_digests(&bytes));
+    }
     budget.check_output(bytes.len())?;
     Ok(Stripped {
         bytes,
@@ -112,6 +118,8 @@ mod tests {
             assert!(found.bytes == before);
             assert_eq!(found.report.mends as usize, mends.len());
             assert!(found.report.patches > 0);
+            let output = found.report.output.unwrap();
+            assert_eq!(output.sha256, file_digests(&before).sha256);
         }
     }
 

@@ -14,6 +14,7 @@ use super::{
     app::{App, RequestLimits, UploadPermit},
     content_coding::ContentCoding,
     counted::{CountedBytes, counted, take},
+    digest::ExpectedDigests,
     error::RequestError,
     media_types::{FORM_DATA, FORM_URLENCODED, GLB, GLTF, JSON, OCTET_STREAM, ZIP},
     pace::{PaceLimits, TooSlow},
@@ -228,7 +229,9 @@ async fn read_body<T>(
     let read = async {
         let checked = check_headers()?;
         let coding = ContentCoding::of(&parts.headers)?;
+        let digests = ExpectedDigests::of(&parts.headers)?;
         let bytes = read_bytes(&mut body, limits).await?;
+        digests.check(&bytes).await?;
         let bytes = match coding {
             Some(coding) => coding.decode(bytes, limits).await?,
             None => bytes,

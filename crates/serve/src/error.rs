@@ -16,6 +16,18 @@ pub enum RequestError {
     /// The request cannot be read.
     #[error("{0}")]
     Malformed(String),
+    /// The body is not the one that its digest tells of.
+    #[error(
+        "the body's {algorithm} is :{found}:, and the header `{header}` says another; it was changed on its way"
+    )]
+    DigestMismatch {
+        /// The header with the digest.
+        header: axum::http::HeaderName,
+        /// Its algorithm.
+        algorithm: &'static str,
+        /// The body's digest, in base64.
+        found: String,
+    },
     /// No such path.
     #[error("there is nothing at this path; /openapi.json lists what there is")]
     NotFound,
@@ -185,6 +197,7 @@ impl RequestError {
     pub fn code(&self) -> Code {
         match self {
             Self::EmptyBody => codes::EMPTY_BODY,
+            Self::DigestMismatch { .. } => codes::DIGEST_MISMATCH,
             Self::Malformed(_) => codes::MALFORMED_REQUEST,
             Self::NotFound => codes::NOT_FOUND,
             Self::MethodNotAllowed => codes::METHOD_NOT_ALLOWED,

@@ -15,6 +15,7 @@ mod connection_table;
 mod connections;
 mod content_coding;
 mod counted;
+mod digest;
 mod editor;
 mod ended_sessions;
 mod error;

@@ -116,7 +116,7 @@ fn strip() -> Value {
         &[GLB, GLTF, ZIP],
     );
     found["content"][MULTIPART_MIXED]["schema"]["properties"]["report"] = reference("StripReport");
-    found["headers"] = json!({ "darn-strip": {
+    found["headers"] = json!({ "repr-digest": repr_digest(), "darn-strip": {
         "description": "`exact`: the bytes from before the first mend, proven by their digest; `structural`: the file was changed \
             afterwards, and darn's patches were taken out of what it is now",
         "schema": { "type": "string", "enum": ["exact", "structural"] },
@@ -159,6 +159,7 @@ fn mended(description: &str, part: &str, media_types: &[&str]) -> Value {
                 "description": "How it went: `filled=3 skipped=1 doubtful=0`; skipped are holes that should have been filled and could not be",
                 "schema": { "type": "string" }
             },
+            "repr-digest": repr_digest(),
             "darn-loops-skipped": { "description": "Boundary loops left as they were", "schema": { "type": "integer" } },
             "darn-anchor-distance": {
                 "description": "Largest distance between the cloth and an anchor, those of gestures included, in the scene's unit; \
@@ -167,6 +168,13 @@ fn mended(description: &str, part: &str, media_types: &[&str]) -> Value {
             },
         },
         "content": content,
+    })
+}
+
+fn repr_digest() -> Value {
+    json!({
+        "description": "SHA-256 and SHA-512 of the answer's body (RFC 9530). `Content-Digest` or `Repr-Digest` of a request are checked",
+        "schema": { "type": "string" },
     })
 }
 
@@ -218,7 +226,7 @@ fn responses(status: &str, success: Value, unprocessable: &str) -> Value {
     for (status, description) in [
         (
             "400",
-            "Not readable: an empty or broken body, not a glTF, no query where one is needed, what is asked not JSON",
+            "Not readable: an empty or broken body, one that is not what its digest says, not a glTF, no query where one is needed, what is asked not JSON",
         ),
         ("408", "The body stopped coming"),
         (

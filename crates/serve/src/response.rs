@@ -11,6 +11,7 @@ use serde::Serialize;
 use uuid::Uuid;
 
 use super::{
+    digest::{self, REPR_DIGEST},
     media_types::{GLB, JSON, MULTIPART_MIXED, OCTET_STREAM},
     telemetry::Metrics,
 };
@@ -121,11 +122,12 @@ struct FilePart {
 
 impl FilePart {
     /// The file after a report in multipart/mixed, or alone.
-    fn render(self, report: Option<Vec<u8>>, headers: HeaderMap) -> Response {
+    fn render(self, report: Option<Vec<u8>>, mut headers: HeaderMap) -> Response {
         let (media_type, body) = match report {
             Some(report) => self.multipart(&report),
             None => (self.media_type.to_owned(), self.bytes),
         };
+        headers.extend(digest::of(&body).map(|value| (REPR_DIGEST, value)));
         let media_type = [(header::CONTENT_TYPE, media_type)];
         let body = Body::from(body);
         (StatusCode::OK, media_type, [NO_STORE], headers, body).into_response()

@@ -22,6 +22,7 @@ use super::{
     app::App,
     body::{self, ScanRequest},
     counted::counted_answer,
+    digest::{CONTENT_DIGEST, REPR_DIGEST},
     error::RequestError,
     media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, PROMETHEUS, ZIP},
     openapi, parameters,
@@ -80,6 +81,8 @@ fn cors(origins: &[String]) -> CorsLayer {
             header::AUTHORIZATION,
             header::CONTENT_ENCODING,
             header::CONTENT_TYPE,
+            CONTENT_DIGEST,
+            REPR_DIGEST,
             REQUEST_ID,
         ])
         .expose_headers([
@@ -87,6 +90,7 @@ fn cors(origins: &[String]) -> CorsLayer {
             LOOPS_SKIPPED,
             RESULT,
             STRIP,
+            REPR_DIGEST,
             ANCHOR_DISTANCE,
             REQUEST_ID,
             header::LOCATION,
