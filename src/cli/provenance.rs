@@ -162,9 +162,12 @@ mod tests {
     use darn_contract::v1::{HoleReport, Weights};
     use std::collections::BTreeMap;
 
-    /// The schema: for each class its properties, whether each must be there, and the class of what it leads to (for
-    /// none, a text or a name outside of the document).
-    const SCHEMA: &[(&str, &[(&str, bool, Option<&str>)])] = &[
+    /// A property: its name, whether it must be there, and the class of what it leads to (for none, a text or a name
+    /// outside of the document).
+    type Property = (&'static str, bool, Option<&'static str>);
+
+    /// The schema: the properties of each class.
+    const SCHEMA: &[(&str, &[Property])] = &[
         (
             "crmdig:D10_Software_Execution",
             &[
