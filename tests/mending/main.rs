@@ -1,5 +1,6 @@
 //! From glTF to glTF with the shipped weights, on cloth that darn's own generator simulated.
 
+mod bodies;
 mod borders;
 mod cloth;
 mod compressed;

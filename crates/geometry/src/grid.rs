@@ -174,8 +174,8 @@ impl Normalisation {
 /// Bicubic (Catmull–Rom) interpolation of positions, one per cell, at a uv; linear extrapolation beyond the outermost
 /// cell centres.
 pub fn evaluate(positions: &[Vec3], uv: Vec2) -> Vec3 {
-    let (wu, iu) = catmull_rom(uv.x);
-    let (wv, iv) = catmull_rom(uv.y);
+    let place = |x: f64| catmull_rom(x * SIDE as f64 - 0.5, SIDE);
+    let ((wu, iu), (wv, iv)) = (place(uv.x), place(uv.y));
     let mut sum = Vec3::zeros();
     for (b, j) in iv.iter().enumerate() {
         for (a, i) in iu.iter().enumerate() {
@@ -185,13 +185,12 @@ pub fn evaluate(positions: &[Vec3], uv: Vec2) -> Vec3 {
     sum
 }
 
-/// Weights and cells of the four samples around `x` along one axis. Next to the border, where a sample is missing,
-/// the two nearest cells interpolate linearly.
-fn catmull_rom(x: f64) -> ([f64; 4], [usize; 4]) {
-    let s = x * SIDE as f64 - 0.5;
-    let base = (s.floor().max(0.0) as usize).min(SIDE - 2);
+/// Weights and indices of the four samples around place `s` on a line of `side` ≥ 2 samples, which lie at 0, 1, 2 and so on.
+/// Next to the ends, where a sample is missing, the two nearest ones interpolate linearly.
+pub(crate) fn catmull_rom(s: f64, side: usize) -> ([f64; 4], [usize; 4]) {
+    let base = (s.floor().max(0.0) as usize).min(side - 2);
     let t = s - base as f64;
-    if base == 0 || base + 2 >= SIDE {
+    if base == 0 || base + 2 >= side {
         return ([0.0, 1.0 - t, t, 0.0], [base, base, base + 1, base + 1]);
     }
     let (t2, t3) = (t * t, t * t * t);

@@ -13,11 +13,11 @@ use crate::welded_scan::WeldedScan;
 use darn_contract::{FieldError, v1};
 use darn_geometry::mesh::denoise::denoise;
 use darn_geometry::mesh::index::LoopId;
-use darn_geometry::mesh::layers::layers_near;
+use darn_geometry::mesh::layers::Layers;
 use darn_geometry::mesh::region::{self, Region};
 use darn_geometry::patch::{FairPatch, PatchWork};
 
-/// Nanoseconds of work a face of the scan in the search for other layers near a hole.
+/// Nanoseconds of work a block of the scan's faces in the search for other layers near a hole.
 const LAYERS_WORK: u64 = 10;
 
 /// A hole without a chart, and the fair surface that closes it.
@@ -48,9 +48,9 @@ impl FairHole {
         call: Call,
     ) -> Result<FairHole, MendError> {
         let (started, budget) = (Instant::now(), call.budget);
-        let scan = &welded.surface.mesh;
-        let region = region::collar(&welded.bounded(), LoopId(id), 0.0, budget)
-            .map_err(MendError::region(id))?;
+        let whole = welded.bounded();
+        let region =
+            region::collar(&whole, LoopId(id), 0.0, budget).map_err(MendError::region(id))?;
         let region_ms = milliseconds(started);
         let started = Instant::now();
         let smooth = denoise(&region.mesh, budget)?.map(|mesh| Region {
@@ -68,10 +68,11 @@ impl FairHole {
                 None => Ok(fair),
             })
             .map_err(MendError::patch(id))?;
-        budget.spend(LAYERS_WORK * scan.faces.len() as u64)?;
+        budget.spend(LAYERS_WORK * welded.blocks.len() as u64)?;
         // No point of the patch is farther from the rim than this.
         let margin = fair.patch.beyond_rim();
-        let fair = fair.clear_of(&layers_near(scan, &region, margin, &[]), budget)?;
+        let layers = Layers::near(&whole, &welded.blocks, &region, margin, &[]);
+        let fair = fair.clear_of(&layers, margin, budget)?;
         let hole = FairHole {
             id,
             denoised: smooth.is_some(),

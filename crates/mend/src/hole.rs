@@ -55,6 +55,8 @@ pub struct Hole {
     pub islands: Vec<LoopId>,
     /// The rim on the chart's unit square.
     pub rim_uv: Vec<Vec2>,
+    /// Cells from one to the next where smooth fills of the grid are solved.
+    pub step: usize,
     /// A smooth fill of the grid, network's units.
     pub base: Option<Vec<[f32; 3]>>,
     /// The unedited cloths made so far.

@@ -18,7 +18,8 @@ pub struct MendLimits {
     pub search: SearchOptions,
     /// Cells that an anchor search compares before its descents start.
     pub seeds: usize,
-    /// Most holes of one request; all their charts, grids and patches are in memory together.
+    /// Most holes of one request. All their charts, grids and patches are in memory together, about 0.7 MB each: the budget's
+    /// memory ends larger requests earlier.
     pub holes: usize,
 }
 
@@ -30,7 +31,7 @@ impl Default for MendLimits {
             edited_fill: EditedFill::default(),
             search: SearchOptions::default(),
             seeds: 16,
-            holes: 1000,
+            holes: 10_000,
         }
     }
 }

@@ -150,7 +150,7 @@ impl<'a> WidenedHole<'a> {
         let open: Vec<bool> = (0..CELLS)
             .map(|k| self.hole.cells.contains(k) || (grid.known[k] && !known[k]))
             .collect();
-        smooth(&self.scanned, known, &open, energy)
+        smooth(&self.scanned, known, &open, energy, self.hole.step)
     }
 
     /// The share of a movement of cells that brings the tested ones nearest to the scan (least squares); `None` when nothing moves.

@@ -14,9 +14,10 @@ use crate::welded_scan::WeldedScan;
 use darn_budget::{Budget, Exhausted};
 use darn_contract::v1;
 use darn_geometry::flatten::{self, Chart, FlattenError};
+use darn_geometry::mesh::blocks::FaceBlocks;
 use darn_geometry::mesh::denoise::denoise;
 use darn_geometry::mesh::index::{FaceId, LoopId};
-use darn_geometry::mesh::layers::layers_near;
+use darn_geometry::mesh::layers::Layers;
 use darn_geometry::mesh::region::{self, BoundedMesh, Region, RegionError};
 use darn_geometry::mesh::sound_hole::SoundHole;
 use darn_geometry::mesh::spikes::spikes;
@@ -40,7 +41,7 @@ const TUBE_STRETCH: f64 = 1.05;
 const MAX_TRIES: usize = 4;
 /// Tries with more and more of the cloth at the rim left out.
 const MISFIT_SEARCHES: usize = 4;
-/// Nanoseconds of work a face of the scan in the search for other layers near a hole.
+/// Nanoseconds of work a block of the scan's faces in the search for other layers near a hole.
 const LAYERS_WORK: u64 = 10;
 
 /// Prepares the hole of a loop, from the sound edge of its cloth: pieces at the rim that do not belong to it are left
@@ -69,6 +70,7 @@ pub fn prepare_hole(welded: &WeldedScan, id: u32, call: Call) -> Result<Hole, Me
         };
         let cloth = Cloth {
             whole: &cloth,
+            blocks: &welded.blocks,
             left: sound.as_ref().map_or(&[], |s| &s.left),
             searches_left,
         };
@@ -86,6 +88,7 @@ pub fn prepare_hole(welded: &WeldedScan, id: u32, call: Call) -> Result<Hole, Me
     }
     let scanned = Cloth {
         whole: &scanned,
+        blocks: &welded.blocks,
         left: &[],
         searches_left: 0,
     };
@@ -102,6 +105,8 @@ pub fn prepare_hole(welded: &WeldedScan, id: u32, call: Call) -> Result<Hole, Me
 /// A scan's cloth without the faces at a hole's rim that do not belong to it.
 struct Cloth<'a> {
     whole: &'a BoundedMesh<'a>,
+    /// The boxes of blocks of its faces.
+    blocks: &'a FaceBlocks,
     /// The faces left out, ascending; they are at no vertex of `whole`.
     left: &'a [FaceId],
     /// How many more searches for such faces may follow.
@@ -350,7 +355,7 @@ impl Preparation<'_> {
         sampled: SampledGrid,
         triangles: TimedMesh,
     ) -> Result<Hole, MendError> {
-        let (id, scan, call) = (self.id, self.cloth.whole.mesh, self.call);
+        let (id, call) = (self.id, self.call);
         let seen = flat.seen();
         let rim_uv = flat.rim_uv();
         let started = Instant::now();
@@ -364,8 +369,16 @@ impl Preparation<'_> {
         .map_err(MendError::patch(id))?;
         // The largest distance that cloth of the hole's extent can have from its rim.
         let beyond = 0.5 * extent(&rim_uv) * flat.chart.frame.side;
-        call.budget.spend(LAYERS_WORK * scan.faces.len() as u64)?;
-        let plan = plan.with_layers(&layers_near(scan, &flat.region, beyond, self.cloth.left));
+        call.budget
+            .spend(LAYERS_WORK * self.cloth.blocks.len() as u64)?;
+        let layers = Layers::near(
+            self.cloth.whole,
+            self.cloth.blocks,
+            &flat.region,
+            beyond,
+            self.cloth.left,
+        );
+        let plan = plan.beside(&layers, beyond, call.budget)?;
         let patch = triangles.milliseconds + milliseconds(started);
         let timings = v1::HoleTimings {
             raster: sampled.milliseconds,
@@ -394,6 +407,7 @@ impl Preparation<'_> {
             cells: sampled.cells,
             reach,
             timings,
+            step: sampled.step,
             base: sampled.base,
             denoised,
             islands,

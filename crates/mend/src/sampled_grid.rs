@@ -8,8 +8,9 @@ use crate::prepare::FlatRegion;
 use crate::timings::milliseconds;
 use darn_budget::Budget;
 use darn_contract::v1;
-use darn_geometry::flatten;
+use darn_geometry::flatten::{self, Chart};
 use darn_geometry::grid::{self, CELLS, Grid, Normalisation};
+use darn_geometry::mesh::region::Region;
 use darn_geometry::mesh::{Vec2, Vec3};
 use darn_geometry::patch::{self, PatchMetric};
 use darn_geometry::polygon::inside;
@@ -25,6 +26,8 @@ pub struct SampledGrid {
     pub normal: Normalisation,
     /// The grid's cells that lie in the hole.
     pub cells: HoleCells,
+    /// Cells from one to the next where smooth fills are solved.
+    pub step: usize,
     /// A smooth fill of the grid, network's units.
     pub base: Option<Vec<[f32; 3]>>,
     /// The lengths that cloth in the hole should have.
@@ -52,7 +55,8 @@ impl SampledGrid {
         let strained = patch::log_stretch(seen, chart);
         let strained: Vec<[f32; 3]> = strained.iter().map(|s| s.cast::<f32>().into()).collect();
         let sheets = [&grid.normalised(&normal).positions[..], &strained];
-        let mut filled = darn_net::plates(&sheets, &grid.known).unwrap_or_default();
+        let step = step(seen, chart);
+        let mut filled = darn_net::plates(&sheets, &grid.known, step).unwrap_or_default();
         let metric = (filled.len() == sheets.len())
             .then(|| filled.pop())
             .flatten();
@@ -64,6 +68,7 @@ impl SampledGrid {
             grid,
             normal,
             cells,
+            step,
             base: filled.pop(),
             metric,
             milliseconds: milliseconds(started),
@@ -81,4 +86,11 @@ impl SampledGrid {
             hole: patch::signed_area(rim_uv).abs(),
         }
     }
+}
+
+/// The largest step of smooth fills that is no longer than the scan's edges: the cloth has no finer shape.
+fn step(region: &Region, chart: &Chart) -> usize {
+    let edge = patch::median_edge(region, chart) * grid::SIDE as f64 / chart.frame.side;
+    let shorter = |step: &usize| *step as f64 <= edge;
+    [8, 4, 2].into_iter().find(shorter).unwrap_or(1)
 }

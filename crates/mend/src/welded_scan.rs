@@ -8,6 +8,7 @@ use crate::cut::CutLoops;
 use crate::timings::milliseconds;
 use darn_contract::{excerpt, v1};
 use darn_geometry::mesh::TriMesh;
+use darn_geometry::mesh::blocks::FaceBlocks;
 use darn_geometry::mesh::index::FaceId;
 use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind, boundary_loops};
 use darn_geometry::mesh::openings::Evidence;
@@ -23,6 +24,8 @@ pub struct WeldedScan {
     pub surface: WeldedMesh,
     /// Its topology.
     pub topology: Topology,
+    /// The boxes of blocks of its faces.
+    pub blocks: FaceBlocks,
     /// Its boundary loops; a loop's id is its index here. One without vertices was there before the request's cuts.
     pub loops: Vec<BoundaryLoop>,
     /// Per loop whether it is a hole of a second skin, which is not filled again.
@@ -84,6 +87,7 @@ impl WeldedScan {
             ..Default::default()
         };
         let welded = WeldedScan {
+            blocks: FaceBlocks::new(&surface.mesh),
             surface,
             topology,
             loops,

@@ -34,18 +34,19 @@ impl InputKind {
 ///
 /// `None` when too few cells are known to determine a plate.
 pub fn plate(positions: &[[f32; 3]], known: &[bool]) -> Option<Vec<[f32; 3]>> {
-    plates(&[positions], known)?.pop()
+    plates(&[positions], known, 1)?.pop()
 }
 
-/// [`plate`] of several grids with the same known cells; takes little longer than one.
-pub fn plates(grids: &[&[[f32; 3]]], known: &[bool]) -> Option<Vec<Vec<[f32; 3]>>> {
+/// [`plate`] of several grids with the same known cells; takes little longer than one. Solved on every `step`-th cell and
+/// interpolated, as by [`smooth_all`].
+pub fn plates(grids: &[&[[f32; 3]]], known: &[bool], step: usize) -> Option<Vec<Vec<[f32; 3]>>> {
     let wide = |p: &[f32; 3]| Vec3::from(p.map(f64::from));
     let grids: Vec<Vec<Vec3>> = (grids.iter())
         .map(|grid| grid.iter().map(wide).collect())
         .collect();
     let grids: Vec<&[Vec3]> = grids.iter().map(Vec::as_slice).collect();
     let open: Vec<bool> = known.iter().map(|k| !k).collect();
-    let filled = smooth_all(&grids, known, &open, Smooth::TautPlate)?;
+    let filled = smooth_all(&grids, known, &open, Smooth::TautPlate, step)?;
     let narrow = |grid: &Vec<Vec3>| grid.iter().map(|p| p.cast::<f32>().into()).collect();
     Some(filled.iter().map(narrow).collect())
 }

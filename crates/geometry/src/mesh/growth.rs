@@ -3,7 +3,7 @@
 use darn_budget::{Budget, Exhausted};
 
 use super::geodesic::geodesic_distance;
-use super::index::{FaceId, HalfEdgeId, LoopId};
+use super::index::{FaceId, HalfEdgeId, LoopId, VertexId};
 use super::loops::BoundaryLoop;
 use super::region::BoundedMesh;
 
@@ -15,8 +15,8 @@ const POCKET: f64 = 1.5;
 const ROUNDS: usize = 8;
 /// Nanoseconds of work a face of the whole mesh in one pass over it.
 const FACE_WORK: u64 = 15;
-/// "On no loop."
-const NO_LOOP: LoopId = LoopId(u32::MAX);
+/// Nanoseconds of work a vertex of the whole mesh in one pass over it.
+const VERTEX_WORK: u64 = 2;
 
 /// What stays the same while the reach shrinks.
 pub(super) struct Growth<'a> {
@@ -28,8 +28,10 @@ pub(super) struct Growth<'a> {
     pub distance: Vec<f64>,
     /// The smallest reach to try, scene units.
     pub narrowest: f64,
-    /// Per half-edge the loop it lies on, [`NO_LOOP`] inside.
-    loop_of: Vec<LoopId>,
+    /// The half-edges of loops near the rim, ascending, each with its loop.
+    on_loops: Vec<(HalfEdgeId, LoopId)>,
+    /// Faces that may belong to the region, ascending: all whose distance from the rim is known, and those that touch it.
+    near: Vec<FaceId>,
     /// Per face whether it touches the rim; such faces always belong to the region.
     touching: Vec<bool>,
 }
@@ -50,32 +52,43 @@ impl<'a> Growth<'a> {
             topology,
             loops,
         } = whole;
-        budget.spend(FACE_WORK * mesh.faces.len() as u64)?;
-        let mut loop_of = vec![NO_LOOP; 3 * mesh.faces.len()];
-        for l in loops {
-            for h in &l.half_edges {
-                loop_of[h.index()] = l.id;
-            }
-        }
+        budget.spend(VERTEX_WORK * mesh.positions.len() as u64)?;
         let mut touching = vec![false; mesh.faces.len()];
         for f in rim.vertices.iter().flat_map(|&v| topology.faces_at(v)) {
             touching[f.index()] = true;
         }
+        let mut near: Vec<FaceId> = (rim.vertices.iter())
+            .flat_map(|&v| topology.faces_at(v))
+            .collect();
+        near.sort_unstable();
+        near.dedup();
         let (mut length, mut count) = (0.0, 0.0);
-        for f in (0..mesh.faces.len()).filter(|&f| touching[f]) {
-            let [a, b, c] = mesh.triangle(f);
+        for f in &near {
+            let [a, b, c] = mesh.triangle(f.index());
             length += (b - a).norm() + (c - b).norm() + (a - c).norm();
             count += 3.0;
         }
         let narrowest = NARROWEST * length / f64::max(count, 1.0);
         let limit = POCKET * reach.max(narrowest);
         let distance = geodesic_distance(mesh, topology, &rim.vertices, limit, budget)?;
+        let is_near = |v: &VertexId| distance[v.index()].is_finite();
+        let vertices = (0..mesh.positions.len() as u32).map(VertexId);
+        near.extend((vertices.filter(is_near)).flat_map(|v| topology.faces_at(v)));
+        budget.spend(FACE_WORK * near.len() as u64)?;
+        near.sort_unstable();
+        near.dedup();
+        let mut on_loops: Vec<(HalfEdgeId, LoopId)> = (loops.iter())
+            .filter(|l| l.vertices.iter().any(is_near))
+            .flat_map(|l| l.half_edges.iter().map(|h| (*h, l.id)))
+            .collect();
+        on_loops.sort_unstable();
         Ok(Self {
             whole,
             rim,
             distance,
             narrowest,
-            loop_of,
+            on_loops,
+            near,
             touching,
         })
     }
@@ -85,12 +98,12 @@ impl<'a> Growth<'a> {
     /// # Errors
     /// `Exhausted`.
     pub fn inside(&self, reach: f64, budget: &Budget) -> Result<Vec<bool>, Exhausted> {
-        let round_work = FACE_WORK * self.whole.mesh.faces.len() as u64;
+        let round_work = FACE_WORK * self.near.len() as u64;
         budget.spend(round_work)?;
-        let mut inside: Vec<bool> = self
-            .faces()
-            .map(|f| self.touching[f.index()] || self.depth(f) <= reach)
-            .collect();
+        let mut inside = vec![false; self.whole.mesh.faces.len()];
+        for f in self.faces() {
+            inside[f.index()] = self.touching[f.index()] || self.depth(f) <= reach;
+        }
         for _ in 0..ROUNDS {
             budget.spend(round_work)?;
             self.drop_islands(&mut inside);
@@ -103,15 +116,16 @@ impl<'a> Growth<'a> {
         Ok(inside)
     }
 
-    /// The loop a half-edge of the whole mesh lies on, if any.
+    /// The loop a half-edge lies on, if any. Only loops near the rim are known.
     pub fn loop_at(&self, half_edge: HalfEdgeId) -> Option<&'a BoundaryLoop> {
-        self.whole
-            .loops
-            .get(self.loop_of[half_edge.index()].index())
+        let at = (self.on_loops).binary_search_by_key(&half_edge, |(h, _)| *h);
+        let (_, id) = self.on_loops[at.ok()?];
+        self.whole.loops.get(id.index())
     }
 
-    fn faces(&self) -> impl Iterator<Item = FaceId> + use<> {
-        (0..self.whole.mesh.faces.len() as u32).map(FaceId)
+    /// The faces that may belong to the region, ascending. All others are farther away than the deepest pocket.
+    pub fn faces(&self) -> impl Iterator<Item = FaceId> {
+        self.near.iter().copied()
     }
 
     /// Distance of the farthest corner of a face from the rim.

@@ -2,39 +2,67 @@
 
 use std::collections::HashSet;
 
+use super::blocks::FaceBlocks;
+use super::bounds::Bounds;
 use super::index::{FaceId, VertexId};
-use super::region::Region;
+use super::region::{BoundedMesh, Region};
 use super::{TriMesh, Vec3};
 
-/// The faces of the whole mesh outside `region` whose bounding boxes come within `margin` (scene units) of the rim's,
-/// as a mesh.
-///
-/// A face with a vertex on the rim is left out: it touches the patch there and does not cut it. So are the faces `left`
-/// (ascending): they are no cloth, and may lie where the cloth was.
-pub fn layers_near(whole: &TriMesh, region: &Region, margin: f64, left: &[FaceId]) -> TriMesh {
-    let rim = || (region.rim.iter()).map(|v| region.mesh.positions[*v as usize]);
-    let low = rim().fold(Vec3::repeat(f64::MAX), |m, p| m.inf(&p)) - Vec3::repeat(margin);
-    let high = rim().fold(Vec3::repeat(f64::MIN), |m, p| m.sup(&p)) + Vec3::repeat(margin);
-    let mut own = vec![false; whole.faces.len()];
-    (region.faces.iter().chain(left)).for_each(|f| own[f.index()] = true);
-    let on_rim: HashSet<VertexId> = (region.rim.iter())
-        .map(|v| region.vertices[*v as usize])
-        .collect();
-    let near = |(face, own): &(&[u32; 3], bool)| {
-        let [a, b, c] = face.map(|v| whole.positions[v as usize]);
-        let (least, most) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));
-        let apart = (0..3).any(|k| most[k] < low[k] || least[k] > high[k]);
-        !own && !apart && !face.iter().any(|v| on_rim.contains(&VertexId(*v)))
-    };
-    let faces = whole.faces.iter().zip(own).filter(near);
-    whole.part(faces.map(|(face, _)| *face))
+/// Faces near a hole, outside its region.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Layers {
+    /// The faces, as a mesh.
+    pub mesh: TriMesh,
+    /// Per face the component that it belongs to, where that is not the hole's.
+    pub other: Vec<Option<u32>>,
+}
+
+impl Layers {
+    /// The faces of the whole mesh, whose `blocks` are given, outside `region` whose bounding boxes come within `margin` (scene units) of the rim's.
+    ///
+    /// A face with a vertex on the rim is left out: it touches the patch there and does not cut it. So are the faces `left`:
+    /// they are no cloth, and may lie where the cloth was.
+    pub fn near(
+        whole: &BoundedMesh,
+        blocks: &FaceBlocks,
+        region: &Region,
+        margin: f64,
+        left: &[FaceId],
+    ) -> Layers {
+        let BoundedMesh { mesh, topology, .. } = whole;
+        let rim = || (region.rim.iter()).map(|v| region.mesh.positions[*v as usize]);
+        let low = rim().fold(Vec3::repeat(f64::MAX), |m, p| m.inf(&p)) - Vec3::repeat(margin);
+        let high = rim().fold(Vec3::repeat(f64::MIN), |m, p| m.sup(&p)) + Vec3::repeat(margin);
+        let place = Bounds { low, high };
+        let own: HashSet<FaceId> = region.faces.iter().chain(left).copied().collect();
+        let on_rim: HashSet<VertexId> = (region.rim.iter())
+            .map(|v| region.vertices[*v as usize])
+            .collect();
+        let is_near = |face: &usize| {
+            let touches = |v: &u32| on_rim.contains(&VertexId(*v));
+            Bounds::of_face(mesh, *face).is_some_and(|b| b.meets(&place))
+                && !own.contains(&FaceId(*face as u32))
+                && !mesh.faces[*face].iter().any(touches)
+        };
+        let near: Vec<usize> = blocks.near(&place).filter(is_near).collect();
+        let component = |face: usize| topology.component[face];
+        let holes_own = region.faces.first().map(|f| component(f.index()));
+        Layers {
+            mesh: mesh.part(near.iter().map(|f| mesh.faces[*f])),
+            other: (near.iter())
+                .map(|f| Some(component(*f)).filter(|c| Some(*c) != holes_own))
+                .collect(),
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::loops::boundary_loops;
     use crate::mesh::region::region_around_hole;
     use crate::mesh::shapes::{concat, sheet};
+    use crate::mesh::topology::Topology;
     use crate::mesh::weld::weld;
 
     #[test]
@@ -43,21 +71,29 @@ mod tests {
         let holed = sheet(30, keep, |u, v| Vec3::new(u, v, 0.0));
         let layer = sheet(30, |_, _| true, |u, v| Vec3::new(u, v, 0.05));
         let mesh = weld(&concat(&holed, &layer)).mesh;
+        let topology = Topology::new(&mesh);
+        let loops = boundary_loops(&mesh, &topology);
+        let whole = BoundedMesh {
+            mesh: &mesh,
+            topology: &topology,
+            loops: &loops,
+        };
+        let blocks = FaceBlocks::new(&mesh);
         let region = region_around_hole(&mesh, 0.2);
         assert!(region.faces.len() < holed.faces.len());
 
-        let near = layers_near(&mesh, &region, 0.06, &[]);
+        let near = Layers::near(&whole, &blocks, &region, 0.06, &[]);
         let above = |p: &&Vec3| p.z > 0.0;
-        assert!(!near.faces.is_empty());
+        assert!(!near.mesh.faces.is_empty());
         assert_eq!(
-            near.positions.iter().filter(above).count(),
-            near.positions.len()
+            near.mesh.positions.iter().filter(above).count(),
+            near.mesh.positions.len()
         );
         assert!(
-            near.positions
-                .iter()
-                .all(|p| (p.xy() - Vec3::repeat(0.5).xy()).amax() < 0.25)
+            (near.mesh.positions.iter()).all(|p| (p.xy() - Vec3::repeat(0.5).xy()).amax() < 0.25)
         );
-        assert_eq!(layers_near(&mesh, &region, 0.04, &[]).faces, [[0; 3]; 0]);
+        assert_eq!(near.other, vec![Some(1); near.mesh.faces.len()]);
+        let nearer = Layers::near(&whole, &blocks, &region, 0.04, &[]);
+        assert_eq!(nearer.mesh.faces, [[0; 3]; 0]);
     }
 }

@@ -6,6 +6,7 @@
 //! From a triangle soup to a hole's surroundings: [`weld::weld`] → [`topology::Topology`] → [`loops::boundary_loops`]
 //! → [`region::grow`].
 
+pub mod blocks;
 mod border;
 pub(crate) mod bounds;
 pub mod curvature;

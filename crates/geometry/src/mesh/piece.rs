@@ -21,17 +21,10 @@ impl Piece {
     /// The faces `inside` as a mesh of its own, cut along some edges.
     pub fn new(growth: &Growth, inside: &[bool], cut: &CutEdges, reach: f64) -> Piece {
         let BoundedMesh { mesh, topology, .. } = growth.whole;
-        let faces: Vec<FaceId> = (0..inside.len() as u32)
-            .map(FaceId)
-            .filter(|f| inside[f.index()])
-            .collect();
-        let mut local = vec![u32::MAX; inside.len()];
-        for (l, f) in (0u32..).zip(&faces) {
-            local[f.index()] = l;
-        }
+        let faces: Vec<FaceId> = growth.faces().filter(|f| inside[f.index()]).collect();
         let to_local = |whole: HalfEdgeId| {
-            let face = FaceId(local[whole.face().index()]);
-            face.half_edges()[whole.corner()]
+            let local = faces.binary_search(&whole.face()).ok()?;
+            Some(FaceId(local as u32).half_edges()[whole.corner()])
         };
         let to_whole = |local: HalfEdgeId| faces[local.face().index()].half_edges()[local.corner()];
         let is_cut = |h: HalfEdgeId| {
@@ -42,8 +35,8 @@ impl Piece {
             .iter()
             .flat_map(|f| f.half_edges())
             .map(|h| {
-                let twin = topology.twin(h).filter(|t| inside[t.face().index()]);
-                twin.filter(|_| !is_cut(h)).map(to_local)
+                let twin = topology.twin(h).filter(|_| !is_cut(h));
+                twin.and_then(to_local)
             })
             .collect();
         let (fan, count) = twins.corner_fans();

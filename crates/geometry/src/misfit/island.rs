@@ -214,6 +214,7 @@ mod tests {
                 open
             },
             crate::smooth::Smooth::ThinPlate,
+            1,
         )?;
         let hole = FilledChart {
             region: &region,

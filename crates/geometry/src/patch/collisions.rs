@@ -8,6 +8,8 @@ use darn_budget::{Budget, Exhausted};
 
 use super::Patch;
 use super::intersections::intersections_from;
+use super::sides::Sides;
+use crate::mesh::layers::Layers;
 use crate::mesh::region::Region;
 use crate::mesh::{TriMesh, Vec3};
 
@@ -24,6 +26,8 @@ pub(super) struct CollisionMesh {
     edges: Vec<RestEdge>,
     /// Mean of their lengths, scene units.
     mean_edge: f64,
+    /// Other components of whose sides the patch keeps to one.
+    sides: Sides,
 }
 
 /// An edge with the length that it should have, scene units.
@@ -47,6 +51,10 @@ const EDGE_WORK: u64 = 80;
 const PUSH: f64 = 0.35;
 /// Sweeps of length correction after each round of pushes.
 const SWEEPS: usize = 4;
+/// Most rounds that bring a patch to its side of other components.
+const SIDE_ROUNDS: usize = 30;
+/// Moves of at most this end them, in mean edges.
+const SLIGHT: f64 = 0.01;
 /// Lengths within 1 ± this of their rest lengths are not corrected.
 const GIVE: f64 = 0.03;
 
@@ -84,6 +92,7 @@ impl CollisionMesh {
             faces,
             mean_edge: edges.iter().map(|e| e.length).sum::<f64>() / edges.len().max(1) as f64,
             edges,
+            sides: Sides::default(),
         }
     }
 
@@ -93,7 +102,22 @@ impl CollisionMesh {
         self
     }
 
-    /// The same with more of the scan that the patch must not cut: layers over or under it, beyond the region.
+    /// The same with what lies near the hole beside its region, which the patch must not cut. Where the region lies on one
+    /// side of another component, such as a body, so will the patch, unless it is farther than `reach` (scene units) from it.
+    ///
+    /// # Errors
+    /// `Exhausted`.
+    pub fn beside(
+        mut self,
+        layers: &Layers,
+        reach: f64,
+        budget: &Budget,
+    ) -> Result<CollisionMesh, Exhausted> {
+        self.sides = Sides::shown_by(&self.positions, layers, self.mean_edge, reach, budget)?;
+        Ok(self.with_layers(&layers.mesh))
+    }
+
+    /// The same with more that the patch must not cut.
     pub fn with_layers(mut self, layers: &TriMesh) -> CollisionMesh {
         let (base, more) = (self.positions.len() as u32, layers.positions.len() as u32);
         // The patch's inner vertices come after all held ones.
@@ -116,10 +140,12 @@ impl CollisionMesh {
         size_of_val(&self.positions[..])
             + size_of_val(&self.faces[..])
             + size_of_val(&self.edges[..])
+            + self.sides.bytes()
     }
 
-    /// Moves inner vertices of the patch until nothing cuts, or keeps the round with the fewest cuts. Adds the pairs
-    /// that came apart to `patch.collisions` and leaves the rest in `patch.crossings`.
+    /// Moves inner vertices of the patch to their side of other components, then until nothing cuts, or keeps the round
+    /// with the fewest cuts. Adds the pairs that came apart to `patch.collisions` and leaves the rest in
+    /// `patch.crossings`.
     ///
     /// The rounds also end when they have looked at too many pairs for the size of the patch: a tangle in which every
     /// face cuts every other does not come apart.
@@ -136,7 +162,11 @@ impl CollisionMesh {
         };
         let mut pairs = intersections_from(&mesh, self.first_face, budget)?;
         let found = pairs.len();
-        let mut least = found;
+        if self.keep_sides(&mut mesh.positions, SIDE_ROUNDS, budget)? {
+            patch.positions[rim..].copy_from_slice(&mesh.positions[base..]);
+            pairs = intersections_from(&mesh, self.first_face, budget)?;
+        }
+        let mut least = pairs.len();
         let mut looked_at = 0;
         for _ in 0..ROUNDS {
             looked_at += pairs.len();
@@ -148,15 +178,51 @@ impl CollisionMesh {
             for _ in 0..SWEEPS {
                 self.restore_lengths(&mut mesh.positions);
             }
+            self.keep_sides(&mut mesh.positions, 1, budget)?;
             pairs = intersections_from(&mesh, self.first_face, budget)?;
             if pairs.len() < least {
                 least = pairs.len();
                 patch.positions[rim..].copy_from_slice(&mesh.positions[base..]);
             }
         }
-        patch.collisions += found - least;
+        patch.collisions += found.saturating_sub(least);
         patch.crossings = least;
         Ok(())
+    }
+
+    /// Moves inner vertices to their side of other components, in so many rounds at most. Whether any moved.
+    ///
+    /// # Errors
+    /// `Exhausted`.
+    fn keep_sides(
+        &self,
+        positions: &mut [Vec3],
+        rounds: usize,
+        budget: &Budget,
+    ) -> Result<bool, Exhausted> {
+        let base = self.positions.len();
+        if self.sides.is_empty() {
+            return Ok(false);
+        }
+        for round in 0..rounds {
+            let inner = &mut positions[base..];
+            budget.spend(Sides::work(inner.len()) + EDGE_WORK * self.edges.len() as u64)?;
+            let mut farthest = 0.0f64;
+            for p in inner {
+                if let Some(push) = self.sides.push(p) {
+                    *p += push;
+                    farthest = farthest.max(push.norm());
+                }
+            }
+            if farthest <= SLIGHT * self.mean_edge {
+                return Ok(round > 0 || farthest > 0.0);
+            }
+            // The last round ends on the right side.
+            if round + 1 < rounds {
+                (0..SWEEPS).for_each(|_| self.restore_lengths(positions));
+            }
+        }
+        Ok(true)
     }
 
     /// One step along the gradients of the intersection curves' lengths.
@@ -316,6 +382,7 @@ mod tests {
             first_face,
             edges,
             mean_edge: 1.0,
+            sides: Sides::default(),
         };
         let mut patch = Patch {
             rim: Vec::new(),
@@ -371,6 +438,7 @@ mod tests {
                 })
                 .collect(),
             mean_edge: 1.0,
+            sides: Sides::default(),
         };
         (patch.positions, patch.collisions) = (tile, 0);
         alone

@@ -16,6 +16,7 @@ use super::collisions::CollisionMesh;
 use super::harmonic::HarmonicExtension;
 use super::plan::rim_pieces;
 use super::{Patch, PatchError, PatchWork};
+use crate::mesh::layers::Layers;
 use crate::mesh::region::Region;
 use crate::mesh::{TriMesh, Vec3};
 use remesh::Sheet;
@@ -109,12 +110,18 @@ impl FairPatch {
         Ok(self)
     }
 
-    /// The same patch clear of itself, of its region and of these layers of the scan, as far as that can be done.
+    /// The same patch clear of itself, of its region and of what lies near the hole beside it, as far as that can be done.
+    /// Where the region lies on one side of another component that is nearer than `reach` (scene units), so does the patch.
     ///
     /// # Errors
     /// `Exhausted`.
-    pub fn clear_of(mut self, layers: &TriMesh, budget: &Budget) -> Result<FairPatch, Exhausted> {
-        self.collisions = self.collisions.with_layers(layers);
+    pub fn clear_of(
+        mut self,
+        layers: &Layers,
+        reach: f64,
+        budget: &Budget,
+    ) -> Result<FairPatch, Exhausted> {
+        self.collisions = self.collisions.beside(layers, reach, budget)?;
         self.collisions.separate(&mut self.patch, budget)?;
         Ok(self)
     }

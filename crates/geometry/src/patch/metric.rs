@@ -110,6 +110,7 @@ mod tests {
             &known,
             &open,
             Smooth::TautPlate,
+            1,
         );
         let centre: Vec2 = region.rim.iter().map(|v| chart.uv(*v)).sum();
         let centre = centre / region.rim.len() as f64;

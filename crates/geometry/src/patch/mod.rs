@@ -24,6 +24,7 @@ mod pull;
 pub mod quality;
 mod rest;
 mod rim_join;
+mod sides;
 mod strain;
 #[cfg(test)]
 mod tests;
@@ -33,7 +34,7 @@ mod untangle;
 pub use energy::StrainOptions;
 pub use fair::FairPatch;
 pub use metric::{PatchMetric, log_stretch};
-pub use plan::{PatchMesh, PatchPlan, plan, stretch_limit};
+pub use plan::{PatchMesh, PatchPlan, median_edge, plan, stretch_limit};
 pub use pull::{Firmness, Pull};
 pub use triangulate::signed_area;
 pub(crate) use triangulate::{Outline, across};

@@ -23,6 +23,7 @@ use super::triangulate::Triangulation;
 use super::{Patch, PatchError, PatchWork};
 use crate::flatten::Chart;
 use crate::grid;
+use crate::mesh::layers::Layers;
 use crate::mesh::region::Region;
 use crate::mesh::{TriMesh, Vec2, Vec3};
 
@@ -186,10 +187,19 @@ impl PatchPlan {
         Ok(self)
     }
 
-    /// The same plan for a patch that must not cut these layers of the scan either.
-    pub fn with_layers(mut self, layers: &TriMesh) -> PatchPlan {
-        self.collisions = self.collisions.with_layers(layers);
-        self
+    /// The same plan for a patch that must not cut what lies near the hole beside its region. Where the region lies on one
+    /// side of another component, such as a body, so will the patch, unless it is farther than `reach` (scene units) from it.
+    ///
+    /// # Errors
+    /// `Exhausted`.
+    pub fn beside(
+        mut self,
+        layers: &Layers,
+        reach: f64,
+        budget: &Budget,
+    ) -> Result<PatchPlan, Exhausted> {
+        self.collisions = self.collisions.beside(layers, reach, budget)?;
+        Ok(self)
     }
 
     /// Separates a finished patch from a mesh that the plan does not contain; the patch stays clear of what the plan
@@ -336,8 +346,8 @@ fn spacing(region: &Region, chart: &Chart) -> f64 {
 /// Least edge length of a patch ÷ median edge length of the scan.
 const FINER: f64 = 0.5;
 
-/// Median edge length of the region in the plane, scene units; 1 without faces.
-fn median_edge(region: &Region, chart: &Chart) -> f64 {
+/// Median edge length of a region in the plane, scene units; 1 without faces.
+pub fn median_edge(region: &Region, chart: &Chart) -> f64 {
     let edge = |f: &[u32; 3], k: usize| {
         (chart.flat[f[k] as usize] - chart.flat[f[(k + 1) % 3] as usize]).norm()
     };

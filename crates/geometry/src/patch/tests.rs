@@ -3,6 +3,7 @@
 use super::*;
 use crate::flatten::{FlattenLimits, UvSquare, flatten};
 use crate::mesh::intersect::intersections_with;
+use crate::mesh::layers::Layers;
 use crate::mesh::loops::boundary_loops;
 use crate::mesh::region::region_around_hole;
 use crate::mesh::shapes::{jitter, sheet};
@@ -196,7 +197,12 @@ fn a_patch_meets_a_moved_rim_and_avoids_a_layer_there() {
     };
     let through = patch(&moved);
     assert!(cuts(&through) > 0, "the plan does not contain the layer");
-    let beside = patch(&moved.with_layers(&layer));
+    let layers = Layers {
+        other: vec![None; layer.faces.len()],
+        mesh: layer.clone(),
+    };
+    let beside = moved.beside(&layers, 0.1, Budget::unlimited()).unwrap();
+    let beside = patch(&beside);
     let wanted = (beside.rim.iter()).map(|v| noisy.mesh.positions[*v as usize]);
     for (own, wanted) in beside.positions.iter().zip(wanted) {
         assert!((own - wanted).norm() < 1e-12);

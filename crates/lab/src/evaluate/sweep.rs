@@ -156,6 +156,7 @@ impl<'a> ObservedCase<'a> {
             &self.grid.known,
             &self.case.sample.hole,
             energy,
+            1,
         );
         filled.ok_or(EvaluateError::Singular {
             fill: method.name(),

@@ -86,7 +86,7 @@ fn cloth_through_cloth_is_counted() {
 fn both_smooth_fills_keep_a_plane_and_only_the_plate_keeps_a_bend() {
     let worst = |case: &EvaluationCase, energy| {
         let seen = case.observed(0.0, 1);
-        let filled = smooth(&seen.positions, &seen.known, &case.sample.hole, energy).unwrap();
+        let filled = smooth(&seen.positions, &seen.known, &case.sample.hole, energy, 1).unwrap();
         measure(case, &filled).metrics.rmse
     };
     let parabola = |u: f64, v: f64| Vec3::new(u, v, (u - 0.5) * (v - 0.5));

@@ -133,7 +133,7 @@ fn with_bases(
     let grids: Vec<&[[f32; 3]]> = (samples.iter())
         .map(|s| s.input.positions.as_slice())
         .collect();
-    let Some(bases) = plates(&grids, scanned) else {
+    let Some(bases) = plates(&grids, scanned, 1) else {
         return Vec::new();
     };
     for (sample, base) in samples.iter_mut().zip(bases) {

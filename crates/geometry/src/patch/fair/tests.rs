@@ -27,7 +27,7 @@ fn patched(soup: &TriMesh, chosen: impl Fn(&BoundaryLoop) -> f64) -> Patch {
     let rim: LoopId = loops.iter().max_by(best).expect("a loop").id;
     let region = collar(&whole, rim, 0.0, Budget::unlimited()).expect("a collar");
     let fair = FairPatch::new(&region, &PatchOptions::default()).expect("a patch");
-    let fair = fair.clear_of(&TriMesh::default(), Budget::unlimited());
+    let fair = fair.clear_of(&Layers::default(), 0.0, Budget::unlimited());
     let patch = fair.expect("no limits").patch;
     for (v, p) in patch.rim.iter().zip(&patch.positions) {
         assert_eq!(*p, region.mesh.positions[*v as usize]);
