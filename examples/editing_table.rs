@@ -266,6 +266,7 @@ impl Case {
             start: None,
             exhaustive: false,
             map: false,
+            map_gradient: false,
         };
         let found = self
             .session

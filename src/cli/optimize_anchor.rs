@@ -55,6 +55,7 @@ pub fn run(args: &OptimizeAnchorArgs) -> Result<(), Failure> {
         start: args.start,
         exhaustive: args.exhaustive,
         map: args.map.is_some(),
+        map_gradient: false,
     };
     let call = || Call {
         mender: &mender,

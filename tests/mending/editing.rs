@@ -292,11 +292,13 @@ fn the_search_finds_the_cell_that_trying_all_finds() {
         start: None,
         exhaustive: false,
         map: false,
+        map_gradient: false,
     };
     let found = cloth.call().optimize_anchor(&search).unwrap();
     let all = Search {
         exhaustive: true,
         map: true,
+        map_gradient: true,
         ..search
     };
     let best = cloth.call().optimize_anchor(&all).unwrap();
@@ -313,6 +315,16 @@ fn the_search_finds_the_cell_that_trying_all_finds() {
     assert_eq!(best.map.len(), 64 * 64);
     assert!(best.map.iter().all(|x| x.is_nan() || *x >= best.loss));
     assert!(best.map_png.starts_with(b"\x89PNG"));
+    assert_eq!(best.map_gradient.len(), 2 * 64 * 64);
+    let alone = Search {
+        map_gradient: false,
+        ..all
+    };
+    let alone = cloth.call().optimize_anchor(&alone).unwrap();
+    let differ = alone.map.iter().zip(&best.map);
+    let differ = differ.filter(|(a, b)| (*a - *b).abs() > 1e-4 * b.abs());
+    assert_eq!(differ.count(), 0, "the gradient changes no loss");
+    assert!(alone.map_gradient.is_empty() && alone.gradients == 1);
 
     // An anchor without uv goes to the same place.
     let asked = anchored(vec![Anchor {
@@ -332,6 +344,7 @@ fn a_target_of_1e17_is_searched_for() {
         start: None,
         exhaustive: false,
         map: false,
+        map_gradient: false,
     };
     let found = cloth.call().optimize_anchor(&search).unwrap();
     assert!(found.loss.is_finite() && found.distance > 9e16);
@@ -394,6 +407,7 @@ fn a_session_answers_as_single_calls_do() {
         start: Some([0.5, 0.5]),
         exhaustive: false,
         map: false,
+        map_gradient: false,
     };
     let kept = session
         .call(Budget::unlimited())

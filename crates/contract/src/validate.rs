@@ -143,6 +143,8 @@ pub struct Search {
     pub exhaustive: bool,
     /// Whether the answer carries the loss of every cell.
     pub map: bool,
+    /// Whether it also carries its gradient there.
+    pub map_gradient: bool,
 }
 
 impl Constraints {
@@ -223,7 +225,8 @@ impl Search {
                 target,
                 start,
                 exhaustive: message.exhaustive,
-                map: message.map,
+                map: message.map || message.map_gradient,
+                map_gradient: message.map_gradient,
             }),
             _ => Err(errors.0),
         }

@@ -115,7 +115,8 @@ impl HoleContext<'_> {
         let mut answer = self.answer(&outcome);
         answer.distance += losses.moved_in;
         if search.map {
-            self.add_map(&mut answer, &losses, &outcome.path)?;
+            let map = self.map(&losses, search.map_gradient)?;
+            self.add_map(&mut answer, &map, &outcome.path)?;
         }
         answer.milliseconds = milliseconds(started);
         Ok(answer)
@@ -159,29 +160,113 @@ impl HoleContext<'_> {
         }
     }
 
-    /// Adds the map of the whole hole, which takes an evaluation with gradient of each of its cells.
-    fn add_map(
-        &self,
-        answer: &mut v1::AnchorFound,
-        losses: &AnchorLosses,
-        path: &[PathCell],
-    ) -> Result<(), MendError> {
-        let indices = self.hole.cells.indices();
+    /// The loss of every cell of the hole, with its gradient: the network's own where that is asked for, else by the
+    /// differences of neighbouring cells.
+    fn map(&self, losses: &AnchorLosses, exact: bool) -> Result<LossMap, MendError> {
+        let cells = self.hole.cells.indices();
         let mut at_cells: Vec<Option<CellLoss>> = vec![None; CELLS];
-        for cells in indices.chunks(self.call.mender.limits.search.batch.max(1)) {
-            for (cell, at) in cells.iter().zip(losses.gradients(cells)?) {
+        for batch in cells.chunks(self.call.mender.limits.search.batch.max(1)) {
+            let found = if exact {
+                losses.gradients(batch)?
+            } else {
+                let alone = |loss| CellLoss {
+                    loss,
+                    gradient: Vec2::zeros(),
+                };
+                losses.losses(batch)?.into_iter().map(alone).collect()
+            };
+            for (cell, at) in batch.iter().zip(found) {
                 at_cells[*cell] = Some(at);
             }
         }
-        let count = indices.len() as u32;
-        answer.evaluations += count;
-        answer.gradients += count;
+        if !exact {
+            for (cell, gradient) in gradients_by_differences(&at_cells) {
+                if let Some(at) = &mut at_cells[cell] {
+                    at.gradient = gradient;
+                }
+            }
+        }
+        Ok(LossMap {
+            at_cells,
+            evaluations: cells.len() as u32,
+            exact,
+        })
+    }
+
+    /// Adds a map to an answer, as numbers and as a picture.
+    fn add_map(
+        &self,
+        answer: &mut v1::AnchorFound,
+        map: &LossMap,
+        path: &[PathCell],
+    ) -> Result<(), MendError> {
+        answer.evaluations += map.evaluations;
         let loss = |at: &Option<CellLoss>| at.map_or(f64::NAN, |at| at.loss);
-        let gradient = |at: &Option<CellLoss>| at.map_or([f64::NAN; 2], |at| at.gradient.into());
-        answer.map = at_cells.iter().map(loss).collect();
-        answer.map_gradient = at_cells.iter().flat_map(gradient).collect();
-        let png = map::png(&map::picture(&at_cells, path)).map_err(MendError::Picture)?;
+        answer.map = map.at_cells.iter().map(loss).collect();
+        if map.exact {
+            answer.gradients += map.evaluations;
+            let gradient =
+                |at: &Option<CellLoss>| at.map_or([f64::NAN; 2], |at| at.gradient.into());
+            answer.map_gradient = map.at_cells.iter().flat_map(gradient).collect();
+        }
+        let png = map::png(&map::picture(&map.at_cells, path)).map_err(MendError::Picture)?;
         answer.map_png = png.into();
         Ok(())
+    }
+}
+
+/// The loss of every cell of a hole.
+struct LossMap {
+    /// One for each of the grid's cells; `None` outside the hole.
+    at_cells: Vec<Option<CellLoss>>,
+    /// Forward passes that it took.
+    evaluations: u32,
+    /// Whether the gradients are the network's own.
+    exact: bool,
+}
+
+/// Per cell with a loss its gradient, per cell width: central differences, one-sided ones next to the hole's rim.
+fn gradients_by_differences(at_cells: &[Option<CellLoss>]) -> Vec<(usize, Vec2)> {
+    let loss = |k: usize| at_cells.get(k).copied().flatten().map(|at| at.loss);
+    let along = |cell: usize, place: usize, step: usize| {
+        let here = loss(cell)?;
+        let before = cell.checked_sub(step).filter(|_| place > 0).and_then(loss);
+        let after = loss(cell + step).filter(|_| place + 1 < SIDE);
+        Some(match (before, after) {
+            (Some(before), Some(after)) => 0.5 * (after - before),
+            (Some(before), None) => here - before,
+            (None, Some(after)) => after - here,
+            (None, None) => 0.0,
+        })
+    };
+    let gradient = |cell: usize| {
+        let (u, v) = (
+            along(cell, cell % SIDE, 1)?,
+            along(cell, cell / SIDE, SIDE)?,
+        );
+        Some((cell, Vec2::new(u, v)))
+    };
+    (0..CELLS).filter_map(gradient).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differences_give_the_gradient_of_a_plane_to_the_rim() {
+        let (du, dv) = (0.3, -0.7);
+        let in_hole = |k: usize| (5..60).contains(&(k % SIDE)) && k / SIDE > 40;
+        let plane = |k: usize| CellLoss {
+            loss: du * (k % SIDE) as f64 + dv * (k / SIDE) as f64,
+            gradient: Vec2::zeros(),
+        };
+        let at_cells: Vec<Option<CellLoss>> =
+            (0..CELLS).map(|k| in_hole(k).then(|| plane(k))).collect();
+        let found = gradients_by_differences(&at_cells);
+        assert_eq!(found.len(), (0..CELLS).filter(|k| in_hole(*k)).count());
+        for (cell, gradient) in found {
+            assert!((gradient - Vec2::new(du, dv)).norm() < 1e-12, "{cell}");
+        }
     }
 }

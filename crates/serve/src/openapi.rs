@@ -27,6 +27,7 @@ pub(super) fn text() -> Bytes {
 pub fn document() -> Value {
     let mut schemas = schema::schemas();
     schemas.insert("Problem".to_owned(), problem_schema());
+    schemas.insert("ProblemCode".to_owned(), problem_codes());
     schemas.insert("Info".to_owned(), info_schema());
     json!({
         "openapi": "3.1.0",
@@ -273,6 +274,15 @@ fn reference(schema: &str) -> Value {
     json!({ "$ref": format!("#/components/schemas/{schema}") })
 }
 
+fn problem_codes() -> Value {
+    let words: Vec<&str> = darn_contract::codes::ALL.iter().map(|c| c.word).collect();
+    json!({
+        "type": "string",
+        "description": "The words of this version; later ones may have more",
+        "enum": words,
+    })
+}
+
 fn problem_schema() -> Value {
     json!({
         "type": "object",
@@ -281,7 +291,10 @@ fn problem_schema() -> Value {
             "type": { "type": "string", "const": "about:blank" },
             "title": { "type": "string", "description": "The status in words" },
             "status": { "type": "integer" },
-            "code": { "type": "string", "description": "Stable word for programs" },
+            "code": {
+                "description": "Stable word for programs",
+                "anyOf": [reference("ProblemCode"), { "type": "string" }],
+            },
             "detail": { "type": "string", "description": "What, where and which limit, for a person" },
             "request_id": { "type": "string" },
             "errors": {
