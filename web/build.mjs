@@ -1,7 +1,8 @@
 // Writes the page that `darn serve` embeds: dist/index.html is served at `/`, dist/editor/* below `/editor/`.
 //
-//   node build.mjs            writes dist/
-//   node build.mjs DIRECTORY  writes there instead, for a comparison of bytes
+//   node build.mjs                    writes dist/
+//   node build.mjs DIRECTORY          writes there instead, for a comparison of bytes
+//   node build.mjs example DIRECTORY  writes the example of clients/typescript there
 //
 // The libraries go into a file of their own, vendor.js, so that a change of our own code leaves it as it is. The worker has what it needs itself:
 // Lit does not run there.
@@ -12,15 +13,16 @@ import { fileURLToPath } from 'node:url';
 import { build } from 'esbuild';
 
 const here = dirname(fileURLToPath(import.meta.url));
-const out = resolve(process.argv[2] ?? join(here, 'dist'));
+const isExample = process.argv[2] === 'example';
+const out = resolve(process.argv[isExample ? 3 : 2] ?? join(here, 'dist'));
 
-/** Imports of vendor.js stay imports. */
-const vendorApart = {
-  name: 'vendor-apart',
+/** Imports of a file of the bundle stay imports. */
+const apart = (name) => ({
+  name: `${name}-apart`,
   setup(bundle) {
-    bundle.onResolve({ filter: /\/vendor\.js$/ }, () => ({ path: './vendor.js', external: true }));
+    bundle.onResolve({ filter: new RegExp(`/${name}\\.js$`) }, () => ({ path: `./${name}.js`, external: true }));
   },
-};
+});
 
 const shared = {
   absWorkingDir: here,
@@ -33,12 +35,31 @@ const shared = {
   logLevel: 'warning',
 };
 
-rmSync(out, { recursive: true, force: true });
-mkdirSync(join(out, 'editor'), { recursive: true });
-await build({ ...shared, entryPoints: ['src/vendor.ts'], outfile: join(out, 'editor/vendor.js') });
-await build({ ...shared, entryPoints: ['src/main.ts'], outfile: join(out, 'editor/main.js'), plugins: [vendorApart] });
-await build({ ...shared, entryPoints: ['src/geometry_worker.ts'], outfile: join(out, 'editor/worker.js') });
-cpSync(join(here, 'static/index.html'), join(out, 'index.html'));
-for (const file of ['page.css', 'icon.svg']) {
-  cpSync(join(here, 'static', file), join(out, 'editor', file));
+if (isExample) {
+  const example = join(here, '../clients/typescript/example');
+  mkdirSync(out, { recursive: true });
+  const nodePaths = [join(here, 'node_modules')];
+  await build({ ...shared, nodePaths, entryPoints: [join(example, 'example.ts')], outfile: join(out, 'example.js') });
+  cpSync(join(example, 'index.html'), join(out, 'index.html'));
+} else {
+  rmSync(out, { recursive: true, force: true });
+  mkdirSync(join(out, 'editor'), { recursive: true });
+  await build({ ...shared, entryPoints: ['src/vendor.ts'], outfile: join(out, 'editor/vendor.js') });
+  await build({
+    ...shared,
+    entryPoints: ['src/main.ts'],
+    outfile: join(out, 'editor/main.js'),
+    plugins: [apart('vendor')],
+  });
+  await build({
+    ...shared,
+    entryPoints: ['src/page.ts'],
+    outfile: join(out, 'editor/page.js'),
+    plugins: [apart('main')],
+  });
+  await build({ ...shared, entryPoints: ['src/geometry_worker.ts'], outfile: join(out, 'editor/worker.js') });
+  cpSync(join(here, 'static/index.html'), join(out, 'index.html'));
+  for (const file of ['page.css', 'icon.svg']) {
+    cpSync(join(here, 'static', file), join(out, 'editor', file));
+  }
 }

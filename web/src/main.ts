@@ -1,2 +1,2 @@
-/** Defines the custom elements of the editor's page. */
+/** Defines the custom element of the editor, for the service's own page and for others. */
 import './ui/editor_element.js';

@@ -4,14 +4,12 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { load } from './sources.mjs';
 
-const { Latest } = await load('model/latest.ts');
+const { Latest, partsOf, problemOf } = await load('client.ts');
 const { History } = await load('model/history.ts');
 const { boundaryLines, linesOfLoops } = await load('scene/boundary.ts');
-const { partsOf } = await load('service/multipart.ts');
 const { readConstraints, onHoles, selectionOf, statelessMessageOf } = await load('model/constraints.ts');
 const { locate, positionOf, normalOf } = await load('model/cloth.ts');
 const { scanOf } = await load('model/scan_files.ts');
-const { problemOf } = await load('service/problem.ts');
 
 /** A promise and what settles it. */
 function deferred() {

@@ -1,5 +1,5 @@
 /** Places on new cloth: from uv to position, in plain numbers. */
-import type { Uv, Vec3 } from '../contract.js';
+import type { Uv, Vec3 } from '../client.js';
 import type { Patch } from './scan_session.js';
 
 /** A place on a patch, whatever the patch's present shape. */

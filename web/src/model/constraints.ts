@@ -1,5 +1,5 @@
 /** What a person asks of the new cloth, as the constraints of the contract. Values never change; edits make new ones. */
-import type { Anchor, Constraints, Edit, Loop } from '../contract.js';
+import type { Anchor, Constraints, Edit, Loop } from '../client.js';
 import { isHole } from './loops.js';
 
 /** Constraints without the choice of holes, which belongs to the session. */

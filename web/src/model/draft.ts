@@ -1,5 +1,5 @@
 /** A gesture or an anchor while it is made, before it is a step. */
-import type { Anchor, Edit, Uv, Vec3 } from '../contract.js';
+import type { Anchor, Edit, Uv, Vec3 } from '../client.js';
 import { locate, middleOf, normalOf, positionOf } from './cloth.js';
 import type { ClothConstraints } from './constraints.js';
 import type { Patch } from './scan_session.js';

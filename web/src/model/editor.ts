@@ -1,8 +1,18 @@
 /** What the editor knows and does, without a page: the scan, its holes, the session, every step and what was chosen. */
-import type { AnchorFound, HoleReport, Info, Loop, Report, Skipped, Uv } from '../contract.js';
-import { describeError, isAbort } from '../service/problem.js';
-import type { Progress } from '../service/requests.js';
-import type { Service } from '../service/service.js';
+import {
+  type AnchorFound,
+  type HoleReport,
+  type Info,
+  type Loop,
+  type Progress,
+  type Report,
+  type Service,
+  type Skipped,
+  type Uv,
+  Latest,
+  describeError,
+  isAbort,
+} from '../client.js';
 import { hasChart } from './cloth.js';
 import {
   type Choice,
@@ -15,7 +25,6 @@ import {
 } from './constraints.js';
 import { type AnchorDraft, type Draft, type DraftKind, NAMES, withAnchor, withGesture } from './draft.js';
 import { History } from './history.js';
-import { Latest } from './latest.js';
 import { isHole } from './loops.js';
 import { type Patch, ScanSession } from './scan_session.js';
 
@@ -63,7 +72,10 @@ const START: Step = {
   report: undefined,
 };
 
-/** The editor's state. It emits `change` whenever something shown has changed, and `opened` after another scan was opened. */
+/**
+ * The editor's state. It emits `change` whenever something shown has changed, `opened` after another scan was opened, `mended` after holes
+ * were filled, and `edited` after the new cloth was changed.
+ */
 export class Editor extends EventTarget {
   scan: OpenScan | undefined;
   /** The loops chosen in the panel, by id. */
@@ -179,7 +191,8 @@ export class Editor extends EventTarget {
     const holes = [...this.chosen].sort((a, b) => a - b);
     const count = `${holes.length} ${holes.length === 1 ? 'hole' : 'holes'}`;
     const { acceptDoubtful } = this;
-    await this.apply(`Mend ${count}`, { holes, acceptDoubtful }, onHoles(this.step.constraints, this.chosen));
+    const constraints = onHoles(this.step.constraints, this.chosen);
+    await this.apply(`Mend ${count}`, { holes, acceptDoubtful }, constraints, 'mended');
   }
 
   /** Shows a gesture while it is made: sends it when the answer to the one before has come. An anchor's place is found only at its commit. */
@@ -322,7 +335,12 @@ export class Editor extends EventTarget {
   }
 
   /** Asks the service for a state and makes it a step. */
-  private async apply(label: string, choice: Choice, constraints: ClothConstraints): Promise<void> {
+  private async apply(
+    label: string,
+    choice: Choice,
+    constraints: ClothConstraints,
+    event: 'mended' | 'edited' = 'edited',
+  ): Promise<void> {
     await this.working(label, async (progress) => {
       if (this.session === undefined || choice.holes.length === 0) {
         return;
@@ -333,6 +351,7 @@ export class Editor extends EventTarget {
       const { acceptDoubtful } = choice;
       this.history.push({ label, holes, acceptDoubtful, constraints, patches, report });
       this.message = this.messageOfStep(label, this.history.present);
+      this.dispatchEvent(new Event(event));
     });
     this.dropDraft();
   }

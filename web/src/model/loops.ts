@@ -1,5 +1,5 @@
 /** Boundary loops as the editor lists them. */
-import type { Loop } from '../contract.js';
+import type { Loop } from '../client.js';
 
 /** A kind of loop, and how it is named and drawn. The colours are told apart in grey, too, and each kind has its own line. */
 export interface KindStyle {

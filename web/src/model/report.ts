@@ -1,5 +1,5 @@
 /** The service's report in words. */
-import type { HoleReport, Report } from '../contract.js';
+import type { HoleReport, Report } from '../client.js';
 import { short } from './loops.js';
 
 const NO_CHART = 'The cloth around it cannot be laid flat: a fair surface without folds, which takes no gestures.';

@@ -1,5 +1,5 @@
 /** What is drawn for the gesture that is being made. */
-import type { Uv } from '../contract.js';
+import type { Uv } from '../client.js';
 import { type ClothPoint, locate, normalOf, positionOf } from '../model/cloth.js';
 import type { Draft } from '../model/draft.js';
 import type { Editor } from '../model/editor.js';

@@ -54,7 +54,7 @@ export class GeometryJobs {
   }
 
   private start(): Worker {
-    const worker = new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
+    const worker = new Worker(workerAddress(), { type: 'module' });
     worker.onmessage = ({ data }: MessageEvent<WorkerAnswer>) => {
       this.waiting.get(data.id)?.(data);
       this.waiting.delete(data.id);
@@ -62,6 +62,16 @@ export class GeometryJobs {
     worker.onerror = () => this.stop();
     return worker;
   }
+}
+
+/** A page may start no worker from another origin, but one of its own may import from there. */
+function workerAddress(): URL | string {
+  const address = new URL('./worker.js', import.meta.url);
+  if (address.origin === location.origin) {
+    return address;
+  }
+  const source = `import ${JSON.stringify(address.href)};`;
+  return URL.createObjectURL(new Blob([source], { type: 'text/javascript' }));
 }
 
 function failed(answer: WorkerAnswer): never {

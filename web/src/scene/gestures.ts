@@ -1,5 +1,5 @@
 /** From a pointer on the picture to a gesture on the cloth. */
-import type { Uv, Vec3 } from '../contract.js';
+import type { Uv, Vec3 } from '../client.js';
 import { type ClothPoint, nearestPatch, normalOf, positionOf } from '../model/cloth.js';
 import type { Draft } from '../model/draft.js';
 import type { Editor } from '../model/editor.js';

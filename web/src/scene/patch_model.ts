@@ -1,5 +1,5 @@
 /** The new cloth of one hole as three.js shows it: its surface follows the patch's positions, and a hit on it has a uv. */
-import type { Uv } from '../contract.js';
+import type { Uv } from '../client.js';
 import { type ClothPoint, hasChart, locate } from '../model/cloth.js';
 import type { Patch } from '../model/scan_session.js';
 import {

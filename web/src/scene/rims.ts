@@ -1,5 +1,5 @@
 /** Boundary loops as lines: the kind gives the colour and whether a line is solid, dashed or dotted. Chosen ones are wider. */
-import type { Loop } from '../contract.js';
+import type { Loop } from '../client.js';
 import { styleOf } from '../model/loops.js';
 import { Box3, Group, Line2, LineGeometry, LineMaterial, Vector3 } from '../vendor.js';
 import type { BoundaryLine } from './boundary.js';

@@ -1,5 +1,5 @@
 /** The picture: a camera around the scan, the scan, its rims and the new cloth; drawn only when something has changed. */
-import type { Loop } from '../contract.js';
+import type { Loop } from '../client.js';
 import type { ClothPoint } from '../model/cloth.js';
 import { byKind } from '../model/loops.js';
 import type { Patch } from '../model/scan_session.js';

@@ -1,5 +1,5 @@
 /** The chart of a hole: the cloth laid flat, the places of gestures and anchors on it, the path and the map of an anchor search. */
-import type { Uv } from '../contract.js';
+import type { Uv } from '../client.js';
 import type { Draft } from '../model/draft.js';
 import { short } from '../model/loops.js';
 import { type TemplateResult, css, html, nothing, svg } from '../vendor.js';

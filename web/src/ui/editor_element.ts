@@ -1,7 +1,16 @@
-/** `<darn-editor>`: the whole editor, as it is served at `/`. */
+/**
+ * `<darn-editor>`: the whole editor, as it is served at `/`, for any page.
+ *
+ * - `base-url`: the address of the service, ending in `/`; by default the one that this module was loaded from. It is read once, before
+ *   the first scan is opened.
+ * - `src`: the address of the scan to open.
+ *
+ * It emits `opened`, `mended`, `edited` and `saved`, which bubble out of shadow trees. The detail of `mended` and `edited` has the report
+ * and the constraints, that of `saved` the file; a listener that prevents the default of `saved` keeps the page from downloading it.
+ */
 import { Editor } from '../model/editor.js';
 import { scanOf } from '../model/scan_files.js';
-import { Service } from '../service/service.js';
+import { Service } from '../client.js';
 import { type TemplateResult, LitElement, css, html, nothing } from '../vendor.js';
 import { download } from './download.js';
 import './chart_panel.js';
@@ -117,31 +126,71 @@ export class EditorElement extends LitElement {
     `,
   ];
 
-  readonly editor = new Editor(new Service(new URL('.', document.baseURI)));
+  static override properties = { src: {}, baseUrl: { attribute: 'base-url' } };
+
+  declare src: string | undefined;
+  declare baseUrl: string | undefined;
   private dragging = false;
-  private readonly changed = (): void => this.requestUpdate();
+  private made: Editor | undefined;
+
+  constructor() {
+    super();
+    this.addEventListener('dragover', this.dragOver);
+    this.addEventListener('dragleave', this.dragLeave);
+    this.addEventListener('drop', this.drop);
+  }
+
+  /** The editor, made when it is needed first: then the properties are known. */
+  get editor(): Editor {
+    this.made ??= this.makeEditor();
+    return this.made;
+  }
+
+  private makeEditor(): Editor {
+    const editor = new Editor(new Service(this.base));
+    editor.addEventListener('change', () => this.requestUpdate());
+    editor.addEventListener('opened', () => this.emit('opened', { name: editor.scan?.name }));
+    for (const name of ['mended', 'edited']) {
+      editor.addEventListener(name, () => {
+        const { report, constraints } = editor.step;
+        this.emit(name, { report, constraints });
+      });
+    }
+    return editor;
+  }
+
+  /** The address of the service. */
+  private get base(): URL {
+    return new URL(this.baseUrl ?? new URL('..', import.meta.url), document.baseURI);
+  }
 
   override connectedCallback(): void {
     super.connectedCallback();
-    this.editor.addEventListener('change', this.changed);
-    addEventListener('dragover', this.dragOver);
-    addEventListener('dragleave', this.dragLeave);
-    addEventListener('drop', this.drop);
     addEventListener('keydown', this.keyDown);
     addEventListener('keyup', this.keyUp);
-    addEventListener('hashchange', this.openNamed);
-    this.openNamed();
   }
 
   override disconnectedCallback(): void {
     super.disconnectedCallback();
-    this.editor.removeEventListener('change', this.changed);
-    removeEventListener('dragover', this.dragOver);
-    removeEventListener('dragleave', this.dragLeave);
-    removeEventListener('drop', this.drop);
     removeEventListener('keydown', this.keyDown);
     removeEventListener('keyup', this.keyUp);
-    removeEventListener('hashchange', this.openNamed);
+  }
+
+  protected override willUpdate(changed: Map<PropertyKey, unknown>): void {
+    const { src } = this;
+    if (!changed.has('src') || src === undefined) {
+      return;
+    }
+    try {
+      void this.editor.openAddress(new URL(src, document.baseURI));
+    } catch {
+      this.editor.report(new Error(`${src} is not an address.`));
+    }
+  }
+
+  /** Tells the page something. Whether the page left the default to the editor. */
+  private emit(name: string, detail: object): boolean {
+    return this.dispatchEvent(new CustomEvent(name, { detail, bubbles: true, composed: true, cancelable: true }));
   }
 
   protected override render(): TemplateResult {
@@ -278,30 +327,17 @@ export class EditorElement extends LitElement {
   }
 
   private readonly openExample = (): void => {
-    void this.editor.openAddress(new URL('editor/scarf_hole.glb', document.baseURI));
-  };
-
-  /** `#scan=URL` opens the scan at an address. */
-  private readonly openNamed = (): void => {
-    const named = new URLSearchParams(location.hash.slice(1)).get('scan');
-    if (named === null) {
-      return;
-    }
-    try {
-      void this.editor.openAddress(new URL(named, document.baseURI));
-    } catch {
-      this.editor.report(new Error(`${named} is not an address.`));
-    }
+    void this.editor.openAddress(new URL('editor/scarf_hole.glb', this.base));
   };
 
   private readonly save = async (): Promise<void> => {
     const result = await this.editor.result();
     if (result !== undefined) {
-      const name = this.editor.scan?.name ?? 'scan.glb';
-      download(
-        result,
-        name.replace(/(\.[a-z]+)?$/i, (ending) => `.mended${ending || '.glb'}`),
-      );
+      const opened = this.editor.scan?.name ?? 'scan.glb';
+      const name = opened.replace(/(\.[a-z]+)?$/i, (ending) => `.mended${ending || '.glb'}`);
+      if (this.emit('saved', { file: result, name })) {
+        download(result, name);
+      }
     }
   };
 
@@ -328,6 +364,9 @@ export class EditorElement extends LitElement {
   private readonly look = (event: CustomEvent<object>): void => this.stage?.viewer?.setLook(event.detail);
 
   private readonly keyDown = (event: KeyboardEvent): void => {
+    if (!this.isMeant(event)) {
+      return;
+    }
     const key = event.key.toLowerCase();
     if ((event.ctrlKey || event.metaKey) && (key === 'z' || key === 'y') && !isTyping(event)) {
       event.preventDefault();
@@ -350,6 +389,12 @@ export class EditorElement extends LitElement {
       this.stage?.viewer?.setLook({ before: true });
     }
   };
+
+  /** Whether a key is for the editor: pressed in it, or nowhere in particular. */
+  private isMeant(event: KeyboardEvent): boolean {
+    const path = event.composedPath();
+    return path.includes(this) || path[0] === document.body;
+  }
 
   private readonly keyUp = (event: KeyboardEvent): void => {
     if (event.key.toLowerCase() === 'b') {

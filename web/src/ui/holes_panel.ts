@@ -1,5 +1,5 @@
 /** The list of boundary loops: which to fill, how long they are, why some are left as they are. */
-import type { Loop } from '../contract.js';
+import type { Loop } from '../client.js';
 import { byKind, isFillable, isHole, short, styleOf } from '../model/loops.js';
 import { type TemplateResult, css, html, nothing, svg } from '../vendor.js';
 import { Panel } from './panel.js';

@@ -1,5 +1,5 @@
 /** The tools, and the gesture that is being made as numbers: all that a pointer can do can be typed here. */
-import type { Uv, Vec3 } from '../contract.js';
+import type { Uv, Vec3 } from '../client.js';
 import {
   type AnchorDraft,
   type Draft,

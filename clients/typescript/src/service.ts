@@ -1,5 +1,5 @@
 /** The service's requests that the editor makes, as functions of a typed client. */
-import type { AnchorFound, AnchorQuery, Constraints, HolesReport, Info, Report, Session } from '../contract.js';
+import type { AnchorFound, AnchorQuery, Constraints, HolesReport, Info, Report, Session } from './contract.js';
 import { partsOf } from './multipart.js';
 import { type Answer, type Progress, jsonOf, send, upload } from './requests.js';
 

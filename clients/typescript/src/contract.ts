@@ -1,5 +1,5 @@
 /**
- * The service's messages, by the names of `proto/darn/v1/darn.proto`. The generated file is written by `npm run contract`
+ * The service's messages, by the names of `proto/darn/v1/darn.proto`. The generated file is written by `scripts/web`
  * from `proto/openapi.json`. Every field may be absent, as in proto3's JSON.
  */
 import type { components } from './contract.generated.js';
@@ -16,6 +16,7 @@ export type HolesReport = Schemas['HolesReport'];
 export type Info = Schemas['Info'];
 export type Loop = Schemas['Loop'];
 export type Problem = Schemas['Problem'];
+export type ProblemCode = Schemas['ProblemCode'];
 export type Report = Schemas['Report'];
 export type Session = Schemas['Session'];
 export type SessionHole = Schemas['SessionHole'];

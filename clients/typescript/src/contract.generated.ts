@@ -55,6 +55,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/strip": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** Take everything out of a scan that darn put in */
+        post: operations["strip"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/sessions": {
         parameters: {
             query?: never;
@@ -354,8 +371,21 @@ export interface components {
             near?: number[];
             /** @description Damaged cloth to cut out first; the holes that this leaves are then filled. */
             cut?: components["schemas"]["Cut"];
+            /** @description A stretch of the cloth's own edge, such as a bite or a rip, to mend up to a new hem. In JSON, `"auto"` may stand for `{"auto": true}`. */
+            border?: components["schemas"]["Border"];
         };
-        /** @description Cloth to cut out, by exactly one of a ball (`center`, `radius`), a polygon (`polygon`, `depth`) and `loops`. The triangles leave the index lists of the scan's primitives; the bytes of the old lists stay, and `extras.darn.cuts` of each primitive says how to put them back. */
+        /** @description A stretch of the cloth's own edge: the shorter way from `from` to `to`; or, with `auto` alone, every bite and rip that is found. */
+        Border: {
+            /** @description Whether every bite and rip that is found is mended. */
+            auto?: boolean;
+            /** @description Where the stretch starts, `[x, y, z]`: the nearest vertex of the cloth's own edge. */
+            from?: number[];
+            /** @description Where it ends, `[x, y, z]`: the nearest vertex of the same loop. */
+            to?: number[];
+            /** @description Points `[x, y, z]` that the new hem goes through, from `from` to `to`; left out, it continues the hem on both sides smoothly. */
+            along?: number[][];
+        };
+        /** @description Cloth to cut out, by exactly one of a ball (`center`, `radius`), a polygon (`polygon`, `depth`) and `loops`. Of several layers in a ball or under a polygon, those nearest to its centre or its corners are cut, and loose pieces that lie in it whole; the others are left. The triangles leave the index lists of the scan's primitives; the bytes of the old lists stay, and `extras.darn.cuts` of each primitive says how to put them back. */
         Cut: {
             /** @description Centre of a ball, `[x, y, z]`: every triangle that reaches into the ball is cut out. */
             center?: number[];
@@ -425,8 +455,10 @@ export interface components {
             start?: number[];
             /** @description Whether every cell is tried. */
             exhaustive?: boolean;
-            /** @description Whether the loss of every tried cell is returned. */
+            /** @description Whether the loss of every cell is returned. */
             map?: boolean;
+            /** @description Whether the map has the gradient of the loss, too; it takes several times as long. */
+            mapGradient?: boolean;
         };
         /** @description Where a point in space belongs on the grid. */
         AnchorFound: {
@@ -450,7 +482,7 @@ export interface components {
             milliseconds?: number;
             /** @description The loss of every cell, row after row along v, NaN outside the hole; only when the query asked for the map. */
             map?: (number | null)[];
-            /** @description Its gradient, `du, dv` of every cell in the same order, per cell width; only when the query asked for the map. */
+            /** @description Its gradient, `du, dv` of every cell in the same order, per cell width; only when the query asked for it. */
             mapGradient?: (number | null)[];
             /** @description The map as a PNG, the path drawn on it; only when the query asked for the map. */
             mapPng?: string;
@@ -518,6 +550,10 @@ export interface components {
             timings?: components["schemas"]["ScanTimings"];
             /** @description What was not taken as the file has it, by kind; the file itself keeps it. */
             setAside?: components["schemas"]["SetAside"][];
+            /** @description Bites and rips at the cloth's own edge, in order of their loops. They are mended only when a request's `border` says so. */
+            candidates?: components["schemas"]["BorderCandidate"][];
+            /** @description What a mesher has probably sealed, the largest first; only when it was asked for. */
+            suspects?: components["schemas"]["Suspect"][];
         };
         /** @description What was not taken as the file has it when its loops were found. */
         SetAside: {
@@ -525,6 +561,34 @@ export interface components {
             kind?: string;
             /** @description How many there are. */
             count?: number;
+        };
+        /** @description A bite or a rip: a stretch of the cloth's own edge that leads into the cloth, between hems that continue each other. */
+        BorderCandidate: {
+            /** @description The loop that it is part of. */
+            loop?: number;
+            /** @description Length of the stretch, in the scene's unit. */
+            length?: number;
+            /** @description Distance of its ends on the cloth laid flat, in the scene's unit. */
+            mouth?: number;
+            /** @description How far it leads into the cloth laid flat, in the scene's unit. */
+            depth?: number;
+            /** @description The stretch: `{"holes": [{"border": this}]}` mends it. */
+            border?: components["schemas"]["Border"];
+        };
+        /** @description A patch of triangles far larger than those around it: probably a hole that a mesher sealed. */
+        Suspect: {
+            /** @description Stable word for the reason: `stretched` (long thin triangles), `oversized` (edges more than three times as long as those around), or `sparse` (less dense than the cloth around). */
+            reason?: string;
+            /** @description The reason with its numbers, for a person. */
+            detail?: string;
+            /** @description Area, in the scene's unit squared. */
+            area?: number;
+            /** @description Mean of its triangles, weighted by area, `[x, y, z]`. */
+            centroid?: number[];
+            /** @description Number of triangles. */
+            faces?: number;
+            /** @description A cut that takes it out: `{"holes": [{"cut": this}]}` mends the place from the cloth around. */
+            cut?: components["schemas"]["Cut"];
         };
         /** @description What Inpaint did. */
         Report: {
@@ -542,6 +606,36 @@ export interface components {
             notes?: string[];
             /** @description What was not taken as the file has it, by kind; the file itself keeps it. */
             setAside?: components["schemas"]["SetAside"][];
+            /** @description Digests of the glTF that came: the file, or the glTF in a zip. Left out of the answers that have patches alone. */
+            input?: components["schemas"]["FileDigests"];
+            /** @description Digests of the glTF that goes back, likewise. */
+            output?: components["schemas"]["FileDigests"];
+        };
+        /** @description Digests of a file, in lower-case hexadecimal. */
+        FileDigests: {
+            /** @description SHA-256. */
+            sha256?: string;
+            /** @description SHA-512. */
+            sha512?: string;
+        };
+        /** @description What was taken out of a scan that darn had mended. */
+        StripReport: {
+            /** @description darn's version. */
+            version?: string;
+            /** @description Whether the scan is what it was before its first mend, byte for byte, proven by a digest. If not, the file was changed by others after a mend (or mended by a darn that kept no record), and the patches were taken out of what it is now. */
+            exact?: boolean;
+            /** @description Mends that were undone byte for byte. */
+            mends?: number;
+            /** @description Holes whose patches were taken out. */
+            patches?: number;
+            /** @description Primitives into which cut triangles were put back. */
+            cuts?: number;
+            /** @description What a person should know. */
+            notes?: string[];
+            /** @description Digests of the glTF that came: the file, or the glTF in a zip. */
+            input?: components["schemas"]["FileDigests"];
+            /** @description Digests of the glTF that goes back, likewise. */
+            output?: components["schemas"]["FileDigests"];
         };
         /** @description A weights file. */
         Weights: {
@@ -574,10 +668,19 @@ export interface components {
             notes?: string[];
             /** @description The hole's gestures, in the order of the request. */
             edits?: components["schemas"]["EditReport"][];
-            /** @description Why the patch is no plausible cloth, each reason for a person; empty for a sound patch. Applied only when the request accepts doubtful patches. */
-            doubts?: string[];
+            /** @description What was cut out before it was filled; left out where nothing was. */
+            cut?: components["schemas"]["CutReport"];
             /** @description Triangles of the scan at the rim that are no part of the cloth's edge, such as spikes, threads and flaps. They stay in the file; the new cloth starts at the sound edge beneath them. */
             leftFaces?: number;
+            /** @description Why the patch is no plausible cloth, each reason for a person; empty for a sound patch. Applied only when the request accepts doubtful patches. */
+            doubts?: string[];
+        };
+        /** @description Cloth that was cut out before a hole was filled. */
+        CutReport: {
+            /** @description Triangles cut out. */
+            faces?: number;
+            /** @description Their area, in the scene's unit squared. */
+            area?: number;
         };
         /** @description How well the cloth around a hole lies flat. */
         ChartReport: {
@@ -740,7 +843,7 @@ export interface components {
             title: string;
             status: number;
             /** @description Stable word for programs */
-            code: string;
+            code: components["schemas"]["ProblemCode"] | string;
             /** @description What, where and which limit, for a person */
             detail: string;
             request_id: string;
@@ -751,6 +854,11 @@ export interface components {
                 detail: string;
             }[];
         };
+        /**
+         * @description The words of this version; later ones may have more
+         * @enum {string}
+         */
+        ProblemCode: "empty_body" | "malformed_request" | "digest_mismatch" | "no_query" | "not_found" | "method_not_allowed" | "body_timeout" | "body_too_large" | "message_too_large" | "constraints_too_large" | "query_too_large" | "unsupported_content_encoding" | "unsupported_media_type" | "invalid_constraints" | "invalid_query" | "session_not_found" | "session_expired" | "session_evicted" | "session_deleted" | "session_too_large" | "session_busy" | "sessions_full" | "internal" | "queue_full" | "memory_full" | "uploads_full" | "draining" | "warming_up" | "deadline_exceeded" | "not_a_gltf" | "invalid_gltf" | "scan_too_large" | "index_out_of_range" | "position_not_finite" | "unsupported_extension" | "external_data" | "no_triangles" | "singular_transform" | "constraints_do_not_fit" | "anchor_out_of_reach" | "too_much_work" | "too_much_memory" | "answer_too_large" | "no_holes" | "nothing_to_strip" | "too_many_holes" | "non_manifold_rim" | "coordinates_too_large" | "not_a_disk" | "not_cloth_like" | "too_little_known" | "rim_crosses_itself" | "patch_degenerate" | "no_plausible_fill" | "hole_too_narrow";
         /** @description The version, and the limits that a client can check before it sends a scan */
         Info: {
             /** @description darn's version */
@@ -784,21 +892,25 @@ export interface operations {
             content: {
                 "model/gltf-binary": unknown;
                 "model/gltf+json": unknown;
+                "application/zip": unknown;
+                "application/octet-stream": unknown;
                 "multipart/form-data": {
-                    /** @description GLB, or glTF with data URIs */
+                    /** @description GLB; glTF, with further parts for the files that it refers to, each named by its URI in the glTF; or a zip with a glTF and its files */
                     scan: unknown;
                     constraints?: components["schemas"]["Constraints"];
                 };
             };
         };
         responses: {
-            /** @description The mended scan, in the container of the input. With `Accept: multipart/mixed`: the part `report` (application/json, schema Report), then the part `scan` */
+            /** @description The mended scan, in the container of the input. One that came with its files goes back as a zip (from a zip) or as the glTF alone (from parts), or as `Accept` prefers: application/zip, model/gltf+json, or model/gltf-binary for one GLB with all files in it. With `Accept: multipart/mixed`: the part `report` (application/json, schema Report), then the part `scan` */
             200: {
                 headers: {
                     /** @description Holes filled */
                     "darn-holes-filled"?: number;
                     /** @description How it went: `filled=3 skipped=1 doubtful=0`; skipped are holes that should have been filled and could not be */
                     "darn-result"?: string;
+                    /** @description SHA-256 and SHA-512 of the answer's body (RFC 9530). `Content-Digest` or `Repr-Digest` of a request are checked */
+                    "repr-digest"?: string;
                     /** @description Boundary loops left as they were */
                     "darn-loops-skipped"?: number;
                     /** @description Largest distance between the cloth and an anchor, those of gestures included, in the scene's unit; absent when there are none */
@@ -808,13 +920,14 @@ export interface operations {
                 content: {
                     "model/gltf-binary": unknown;
                     "model/gltf+json": unknown;
+                    "application/zip": unknown;
                     "multipart/mixed": {
                         report?: components["schemas"]["Report"];
                         scan?: unknown;
                     };
                 };
             };
-            /** @description Not readable: an empty or broken body, not a glTF, no query where one is needed, what is asked not JSON */
+            /** @description Not readable: an empty or broken body, one that is not what its digest says, not a glTF, no query where one is needed, what is asked not JSON */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -902,8 +1015,10 @@ export interface operations {
             content: {
                 "model/gltf-binary": unknown;
                 "model/gltf+json": unknown;
+                "application/zip": unknown;
+                "application/octet-stream": unknown;
                 "multipart/form-data": {
-                    /** @description GLB, or glTF with data URIs */
+                    /** @description GLB; glTF, with further parts for the files that it refers to, each named by its URI in the glTF; or a zip with a glTF and its files */
                     scan: unknown;
                 };
             };
@@ -918,7 +1033,7 @@ export interface operations {
                     "application/json": components["schemas"]["HolesReport"];
                 };
             };
-            /** @description Not readable: an empty or broken body, not a glTF, no query where one is needed, what is asked not JSON */
+            /** @description Not readable: an empty or broken body, one that is not what its digest says, not a glTF, no query where one is needed, what is asked not JSON */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -1002,7 +1117,7 @@ export interface operations {
         requestBody: {
             content: {
                 "multipart/form-data": {
-                    /** @description GLB, or glTF with data URIs */
+                    /** @description GLB; glTF, with further parts for the files that it refers to, each named by its URI in the glTF; or a zip with a glTF and its files */
                     scan: unknown;
                     query: components["schemas"]["AnchorQuery"];
                 };
@@ -1018,13 +1133,14 @@ export interface operations {
                     "application/json": components["schemas"]["AnchorFound"];
                     "model/gltf-binary": unknown;
                     "model/gltf+json": unknown;
+                    "application/zip": unknown;
                     "multipart/mixed": {
                         report?: components["schemas"]["Report"];
                         scan?: unknown;
                     };
                 };
             };
-            /** @description Not readable: an empty or broken body, not a glTF, no query where one is needed, what is asked not JSON */
+            /** @description Not readable: an empty or broken body, one that is not what its digest says, not a glTF, no query where one is needed, what is asked not JSON */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -1098,6 +1214,119 @@ export interface operations {
             };
         };
     };
+    strip: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "model/gltf-binary": unknown;
+                "model/gltf+json": unknown;
+                "application/zip": unknown;
+                "application/octet-stream": unknown;
+                "multipart/form-data": {
+                    /** @description GLB; glTF, with further parts for the files that it refers to, each named by its URI in the glTF; or a zip with a glTF and its files */
+                    scan: unknown;
+                };
+            };
+        };
+        responses: {
+            /** @description The scan without what darn put in, in the container of the input; one that came with its files goes back as a mended one does. With `Accept: multipart/mixed`: the part `report` (application/json, schema StripReport), then the part `scan` */
+            200: {
+                headers: {
+                    /** @description SHA-256 and SHA-512 of the answer's body (RFC 9530). `Content-Digest` or `Repr-Digest` of a request are checked */
+                    "repr-digest"?: string;
+                    /** @description `exact`: the bytes from before the first mend, proven by their digest; `structural`: the file was changed afterwards, and darn's patches were taken out of what it is now */
+                    "darn-strip"?: "exact" | "structural";
+                    [name: string]: unknown;
+                };
+                content: {
+                    "model/gltf-binary": unknown;
+                    "model/gltf+json": unknown;
+                    "application/zip": unknown;
+                    "multipart/mixed": {
+                        report?: components["schemas"]["StripReport"];
+                        scan?: unknown;
+                    };
+                };
+            };
+            /** @description Not readable: an empty or broken body, one that is not what its digest says, not a glTF, no query where one is needed, what is asked not JSON */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body stopped coming */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Larger than a limit of the service; the limit is named */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A content type or a content encoding that is not read here */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description With code `nothing_to_strip`: the scan has nothing of darn's */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An error of the service; its log has it under the request id */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The queue is full, too many requests are being received, or the service shuts down; `retry-after` says when to come back */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Waiting and mending took longer than the deadline */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
     openSession: {
         parameters: {
             query?: never;
@@ -1109,8 +1338,10 @@ export interface operations {
             content: {
                 "model/gltf-binary": unknown;
                 "model/gltf+json": unknown;
+                "application/zip": unknown;
+                "application/octet-stream": unknown;
                 "multipart/form-data": {
-                    /** @description GLB, or glTF with data URIs */
+                    /** @description GLB; glTF, with further parts for the files that it refers to, each named by its URI in the glTF; or a zip with a glTF and its files */
                     scan: unknown;
                     constraints?: components["schemas"]["Constraints"];
                 };
@@ -1128,7 +1359,7 @@ export interface operations {
                     "application/json": components["schemas"]["Session"];
                 };
             };
-            /** @description Not readable: an empty or broken body, not a glTF, no query where one is needed, what is asked not JSON */
+            /** @description Not readable: an empty or broken body, one that is not what its digest says, not a glTF, no query where one is needed, what is asked not JSON */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -1358,6 +1589,8 @@ export interface operations {
                     "darn-holes-filled"?: number;
                     /** @description How it went: `filled=3 skipped=1 doubtful=0`; skipped are holes that should have been filled and could not be */
                     "darn-result"?: string;
+                    /** @description SHA-256 and SHA-512 of the answer's body (RFC 9530). `Content-Digest` or `Repr-Digest` of a request are checked */
+                    "repr-digest"?: string;
                     /** @description Boundary loops left as they were */
                     "darn-loops-skipped"?: number;
                     /** @description Largest distance between the cloth and an anchor, those of gestures included, in the scene's unit; absent when there are none */
@@ -1373,7 +1606,7 @@ export interface operations {
                     };
                 };
             };
-            /** @description Not readable: an empty or broken body, not a glTF, no query where one is needed, what is asked not JSON */
+            /** @description Not readable: an empty or broken body, one that is not what its digest says, not a glTF, no query where one is needed, what is asked not JSON */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -1500,7 +1733,7 @@ export interface operations {
                     "application/json": components["schemas"]["AnchorFound"];
                 };
             };
-            /** @description Not readable: an empty or broken body, not a glTF, no query where one is needed, what is asked not JSON */
+            /** @description Not readable: an empty or broken body, one that is not what its digest says, not a glTF, no query where one is needed, what is asked not JSON */
             400: {
                 headers: {
                     [name: string]: unknown;
@@ -1619,6 +1852,8 @@ export interface operations {
                     "darn-holes-filled"?: number;
                     /** @description How it went: `filled=3 skipped=1 doubtful=0`; skipped are holes that should have been filled and could not be */
                     "darn-result"?: string;
+                    /** @description SHA-256 and SHA-512 of the answer's body (RFC 9530). `Content-Digest` or `Repr-Digest` of a request are checked */
+                    "repr-digest"?: string;
                     /** @description Boundary loops left as they were */
                     "darn-loops-skipped"?: number;
                     /** @description Largest distance between the cloth and an anchor, those of gestures included, in the scene's unit; absent when there are none */

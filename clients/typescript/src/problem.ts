@@ -1,5 +1,5 @@
 /** Refusals of the service, and failures to reach it, as errors for a person. */
-import type { Problem } from '../contract.js';
+import type { Problem } from './contract.js';
 
 /** A problem document (RFC 9457) as an error. */
 export class ProblemError extends Error {

@@ -1,0 +1,1 @@
+import"./main.js";function n(){let e=new URLSearchParams(location.hash.slice(1)).get("scan");e!==null&&document.querySelector("darn-editor")?.setAttribute("src",e)}addEventListener("hashchange",n);n();
