@@ -21,7 +21,9 @@ async function serve(files) {
   const server = createServer((request, response) => {
     const body = files.get(new URL(request.url, 'http://any').pathname);
     const type = types[extname(request.url.split('?')[0])] ?? 'text/html';
-    response.writeHead(body === undefined ? 404 : 200, { 'content-type': type });
+    // Browsers ask for an icon that nobody named.
+    const missing = request.url === '/favicon.ico' ? 204 : 404;
+    response.writeHead(body === undefined ? missing : 200, { 'content-type': type });
     response.end(body);
   });
   await new Promise((listening) => server.listen(0, '127.0.0.1', listening));

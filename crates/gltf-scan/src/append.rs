@@ -10,7 +10,6 @@ use serde_json::{Map, Value, json};
 use super::buffers::BufferTarget;
 use super::compressed::meshopt;
 use super::container::{Container, pack_glb, too_long};
-use super::digests::sha256;
 use super::error::ScanError;
 use super::json_edit::JsonEdit;
 use super::scan::Scan;
@@ -109,7 +108,7 @@ impl<'s> Appender<'s> {
             start,
             in_bin,
             data: Vec::new(),
-            sha256: sha256(&scan.bytes),
+            sha256: scan.digests().sha256.clone(),
         }
     }
 

@@ -14,10 +14,11 @@ pub struct FileDigests {
 impl FileDigests {
     /// The digests of a file's bytes.
     pub fn of(bytes: &[u8]) -> Self {
-        Self {
-            sha256: hexadecimal(&Sha256::digest(bytes)),
-            sha512: hexadecimal(&Sha512::digest(bytes)),
-        }
+        let (sha256, sha512) = rayon::join(
+            || hexadecimal(&Sha256::digest(bytes)),
+            || hexadecimal(&Sha512::digest(bytes)),
+        );
+        Self { sha256, sha512 }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::Range;
+use std::sync::Arc;
 
 use bytes::Bytes;
 use darn_budget::Budget;
@@ -143,6 +144,7 @@ fn read_files(
         json,
         cut: BTreeSet::new(),
         json_held,
+        digests: Arc::default(),
     };
     budget.hold(scan.unpacked_bytes())?;
     budget.hold(scan.decoded_bytes())?;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use bytes::Bytes;
 use darn_geometry::mesh::TriMesh;
@@ -10,6 +10,7 @@ use gltf::json::accessor::Type;
 use serde_json::Value;
 
 use super::container::{Container, ContainerLayout};
+use super::digests::FileDigests;
 use super::files::{Companions, Siblings};
 use super::scene::NodeTransform;
 use super::skin::{Influence, Influences};
@@ -35,6 +36,8 @@ pub struct Scan {
     pub(crate) cut: BTreeSet<(usize, usize)>,
     /// Bytes of memory that the parsed JSON takes.
     pub(crate) json_held: usize,
+    /// The digests of `bytes`, made when they are first asked for.
+    pub(crate) digests: Arc<OnceLock<FileDigests>>,
 }
 
 /// A triangle primitive as one node draws it.

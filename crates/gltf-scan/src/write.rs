@@ -58,7 +58,7 @@ impl Scan {
             };
             return Ok(WrittenScan {
                 bytes: bytes.to_vec(),
-                digests: self.digests(),
+                digests: self.digests().clone(),
             });
         }
         let mut out = Appender::new(self);
@@ -103,8 +103,8 @@ impl Scan {
     }
 
     /// The digests of the glTF as it was read: the file, or the glTF in a zip.
-    pub fn digests(&self) -> FileDigests {
-        FileDigests::of(&self.bytes)
+    pub fn digests(&self) -> &FileDigests {
+        self.digests.get_or_init(|| FileDigests::of(&self.bytes))
     }
 
     /// The patches by the primitive that they share, in the order of each primitive's first patch.

@@ -246,7 +246,7 @@ impl ScanHoles {
         let started = Instant::now();
         let written = self.seen(scan).write_within(&additions, call.budget)?;
         let mut report = self.report(scan, filled);
-        report.input = Some(digests::message(scan.digests()));
+        report.input = Some(digests::message(scan.digests().clone()));
         report.output = Some(digests::message(written.digests));
         if let Some(timings) = &mut report.timings {
             timings.write = milliseconds(started);
