@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // 3. Positions for the unknown cells. A network fills the grid here in the service.
     let unknown: Vec<bool> = grid.known.iter().map(|known| !known).collect();
-    let filled = smooth(&grid.positions, &grid.known, &unknown, Smooth::TautPlate);
+    let filled = smooth(&grid.positions, &grid.known, &unknown, Smooth::TautPlate, 1);
     let filled = filled.ok_or("the known cells do not determine the fill")?;
 
     // 4. The patch, and its quality.
