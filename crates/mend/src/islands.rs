@@ -2,8 +2,9 @@
 
 use crate::error::MendError;
 use crate::mender::Call;
-use crate::prepare::{Denoise, FlatRegion};
+use crate::prepare::FlatRegion;
 use crate::sampled_grid::SampledGrid;
+use crate::without_noise::Denoise;
 use darn_geometry::flatten::{self, FlattenError};
 use darn_geometry::mesh::Vec3;
 use darn_geometry::mesh::index::LoopId;

@@ -56,6 +56,7 @@ mod suspects;
 mod testing;
 mod timings;
 mod welded_scan;
+mod without_noise;
 
 use std::time::Instant;
 

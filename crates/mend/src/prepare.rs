@@ -1,6 +1,5 @@
 //! Prepares a hole: grows the region of cloth around it, lays the region flat and plans the patch.
 
-use std::cell::Cell;
 use std::time::Instant;
 
 use crate::edit::{ReachLimit, RimPoint};
@@ -11,17 +10,17 @@ use crate::mender::Call;
 use crate::sampled_grid::SampledGrid;
 use crate::timings::milliseconds;
 use crate::welded_scan::WeldedScan;
+use crate::without_noise::{Denoise, without_noise};
 use darn_budget::{Budget, Exhausted};
 use darn_contract::v1;
 use darn_geometry::flatten::{self, Chart, FlattenError};
+use darn_geometry::mesh::Vec2;
 use darn_geometry::mesh::blocks::FaceBlocks;
-use darn_geometry::mesh::denoise::denoise;
 use darn_geometry::mesh::index::{FaceId, LoopId};
 use darn_geometry::mesh::layers::Layers;
 use darn_geometry::mesh::region::{self, BoundedMesh, Region, RegionError};
 use darn_geometry::mesh::sound_hole::SoundHole;
 use darn_geometry::mesh::spikes::spikes;
-use darn_geometry::mesh::{TriMesh, Vec2};
 use darn_geometry::misfit::{flaps, overlapping_lip};
 use darn_geometry::patch::{PatchError, PatchMesh};
 use darn_geometry::polygon::extent;
@@ -126,7 +125,7 @@ impl Cloth<'_> {
     /// cloth with the scanner's noise.
     fn prepare(&self, id: u32, call: Call) -> Result<Prepared, MendError> {
         let reach = reach_for(estimated_extent(self.whole, id, call.budget)?);
-        without_noise(call.budget, |denoise| {
+        without_noise(call.budget, may_shrink, |denoise| {
             let preparation = Preparation {
                 cloth: self,
                 id,
@@ -153,28 +152,6 @@ impl Cloth<'_> {
             Prepared::Hole(hole) => Ok(*hole),
             Prepared::Misfit(_) => Err(MendError::patch(id)(PatchError::RimCrosses)),
         }
-    }
-}
-
-/// Takes the scanner's noise off a mesh; `None` where it has none, or where the noise is to stay.
-pub type Denoise<'a> = &'a dyn Fn(&TriMesh) -> Result<Option<TriMesh>, Exhausted>;
-
-/// The result for the cloth without the scanner's noise; where that cannot be used, for the cloth as it was scanned.
-fn without_noise<T>(
-    budget: &Budget,
-    attempt: impl Fn(Denoise) -> Result<T, MendError>,
-) -> Result<T, MendError> {
-    let noisy = Cell::new(false);
-    let denoise = |mesh: &TriMesh| {
-        let smooth = denoise(mesh, budget)?;
-        noisy.set(noisy.get() || smooth.is_some());
-        Ok(smooth)
-    };
-    match attempt(&denoise) {
-        Err(error) if noisy.get() && may_shrink(&error) => {
-            attempt(&|_| Ok(None)).map_err(|_| error)
-        }
-        outcome => outcome,
     }
 }
 
