@@ -24,9 +24,9 @@ run: ## Set up, build, serve on DARN_LISTEN, mend the example through HTTP, go o
 	$(CARGO) build --release --locked
 	@scripts/run
 
+# `cargo test` builds target/release/darn, too; `cargo build` would compile our crates once more, with other features.
 test: ## Set up and run all tests
 	@scripts/setup
-	$(CARGO) build --release --locked
 	$(CARGO) test --release --locked --workspace --lib --bins --tests
 	$(CARGO) test --release --locked --workspace --doc
 	@scripts/validate
