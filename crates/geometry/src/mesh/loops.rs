@@ -44,7 +44,7 @@ pub struct BoundaryLoop {
     pub turning: f64,
     /// What it bounds.
     pub kind: LoopKind,
-    /// Largest distance between two of its vertices, scene units, found by [`diameter`] in a few sweeps.
+    /// Largest distance between two of its vertices, scene units, found by `diameter` in a few sweeps.
     pub diameter: f64,
     /// Probability of the kind, 0.5 to 1, of a hole or an opening; 1 for other kinds.
     pub confidence: f64,
