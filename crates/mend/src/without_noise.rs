@@ -30,3 +30,55 @@ pub fn without_noise<T>(
         outcome => outcome,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use darn_geometry::mesh::Vec3;
+    use darn_geometry::mesh::shapes::{jitter, sheet};
+    use darn_geometry::patch::PatchError;
+
+    #[test]
+    fn the_cloth_with_its_noise_is_tried_last() {
+        let clean = sheet(30, |_, _| true, |u, v| Vec3::new(u, v, 0.0));
+        let noisy = jitter(&clean, 0.3 / 30.0, 7);
+        let crosses = || MendError::Patch {
+            hole: 1,
+            source: PatchError::RimCrosses,
+        };
+        let crosses_rim = |error: &MendError| matches!(error, MendError::Patch { .. });
+        let tries = Cell::new(0);
+        // Fails where noise was taken off.
+        let fails_if_denoised = |scan: &TriMesh| {
+            tries.set(0);
+            without_noise(Budget::unlimited(), crosses_rim, |denoise| {
+                tries.set(tries.get() + 1);
+                match denoise(scan)? {
+                    None => Ok("as scanned"),
+                    Some(_) => Err(crosses()),
+                }
+            })
+        };
+        assert_eq!(fails_if_denoised(&clean).ok(), Some("as scanned"));
+        assert_eq!(tries.get(), 1);
+        assert_eq!(fails_if_denoised(&noisy).ok(), Some("as scanned"));
+        assert_eq!(tries.get(), 2);
+        let always_fails = |scan: &TriMesh, error: fn() -> MendError| {
+            tries.set(0);
+            without_noise(
+                Budget::unlimited(),
+                crosses_rim,
+                |denoise| -> Result<(), MendError> {
+                    tries.set(tries.get() + 1);
+                    denoise(scan)?;
+                    Err(error())
+                },
+            )
+        };
+        assert!(always_fails(&noisy, crosses).is_err() && tries.get() == 2);
+        // A second try would not help cloth that has no noise, nor after another error.
+        assert!(always_fails(&clean, crosses).is_err() && tries.get() == 1);
+        let other = || MendError::NonManifold { hole: 1 };
+        assert!(always_fails(&noisy, other).is_err() && tries.get() == 1);
+    }
+}
