@@ -131,7 +131,7 @@ pub fn run(args: &EvaluateArgs) -> Result<(), Failure> {
         let text = json!({
             "weights": network.card(), "seed": args.seed, "report": report, "scans": scans,
         });
-        files::write(path, &pretty(&text)?)?;
+        files::write(path, &files::json(&text, "write the report")?)?;
     }
     match &args.picture {
         Some(path) => files::write(path, evaluate::picture(&report).as_bytes()),
@@ -177,15 +177,9 @@ fn garments(args: &EvaluateArgs, set: Option<&Path>) -> Result<(), Failure> {
     let report = report.or_fail("evaluate")?;
     print!("{}", report.markdown());
     match &args.json {
-        Some(path) => files::write(path, &pretty(&json!(report))?),
+        Some(path) => files::write(path, &files::json(&json!(report), "write the report")?),
         None => Ok(()),
     }
-}
-
-fn pretty(value: &serde_json::Value) -> Result<Vec<u8>, Failure> {
-    let mut text = serde_json::to_vec_pretty(value).or_fail("write the report")?;
-    text.push(b'\n');
-    Ok(text)
 }
 
 /// A line of the table of shares.
@@ -240,7 +234,7 @@ fn masks(
         let all: Vec<_> = (rows.iter())
             .map(|row| json!({"name": row.name, "refused": row.refused, "shares": row.shares}))
             .collect();
-        files::write(path, &pretty(&json!(all))?)?;
+        files::write(path, &files::json(&json!(all), "write the report")?)?;
     }
     Ok(())
 }

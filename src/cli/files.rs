@@ -4,7 +4,8 @@ use super::failure::{Failure, OrFail};
 use crate::settings::SizeArgs;
 use darn_budget::Budget;
 use darn_contract::v1::FileDigests;
-use darn_gltf_scan::{Scan, Siblings, sibling_paths};
+use darn_gltf_scan::{Container, Scan, Siblings, sibling_paths};
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -51,7 +52,7 @@ fn siblings(gltf: &Path, paths: Vec<String>) -> Result<Siblings, Failure> {
 pub fn write_scan(path: &Path, scan: &Scan, mended: &[u8]) -> Result<Option<FileDigests>, Failure> {
     let writing = || format!("write {}", path.display());
     let extension = path.extension().unwrap_or_default();
-    if extension.eq_ignore_ascii_case("glb") {
+    if extension.eq_ignore_ascii_case("glb") && scan.container() != Container::Glb {
         let packed = scan.packed(mended).or_fail(writing())?;
         write(path, &packed)?;
         return Ok(Some(darn_mend::file_digests(&packed)));
@@ -67,6 +68,13 @@ pub fn write_scan(path: &Path, scan: &Scan, mended: &[u8]) -> Result<Option<File
         }
     }
     Ok(None)
+}
+
+/// A message as the text of a JSON file; `doing` says what fails when it cannot be written.
+pub fn json(message: &impl Serialize, doing: &str) -> Result<Vec<u8>, Failure> {
+    let mut text = serde_json::to_vec_pretty(message).or_fail(doing)?;
+    text.push(b'\n');
+    Ok(text)
 }
 
 /// Writes a file beside its target and renames it, so that no reader sees a part of it.

@@ -66,24 +66,24 @@ pub fn run(args: &InpaintArgs) -> Result<(), Failure> {
     if let Some(packed) = files::write_scan(&args.output, &scan, &mended.bytes)? {
         mended.report.output = Some(packed);
     }
-    let mut report = serde_json::to_vec_pretty(&mended.report).or_fail("write the report")?;
-    report.push(b'\n');
+    let report = files::json(&mended.report, "write the report")?;
     if let Some(path) = &args.report {
         files::write(path, &report)?;
     }
     if let Some(path) = &args.provenance {
-        write_provenance(path, args, (&mended.report, &report))?;
+        write_provenance(path, args, &mended.report, &report)?;
     }
     drop(progress);
     print!("{}", summary(&mended.report));
     Ok(())
 }
 
-/// Writes the provenance of a mend; also takes its report as it was written.
+/// Writes the provenance of a mend; `text` is its report as it was written.
 fn write_provenance(
     path: &Path,
     args: &InpaintArgs,
-    (report, text): (&Report, &[u8]),
+    report: &Report,
+    text: &[u8],
 ) -> Result<(), Failure> {
     let name = |path: &Path| {
         path.file_name()
@@ -104,9 +104,7 @@ fn write_provenance(
         log: log.as_deref().map(|log| (log, text)),
         date: args.date.as_deref(),
     });
-    let mut json = serde_json::to_vec_pretty(&document).or_fail("write the provenance")?;
-    json.push(b'\n');
-    files::write(path, &json)
+    files::write(path, &files::json(&document, "write the provenance")?)
 }
 
 /// The constraints in a file; invalid ones are wrong usage.

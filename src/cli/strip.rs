@@ -32,9 +32,7 @@ pub fn run(args: &StripArgs) -> Result<(), Failure> {
         .or_fail(format!("strip {name}"))?;
     files::write(&args.output, &stripped.bytes)?;
     if let Some(path) = &args.report {
-        let mut json = serde_json::to_vec_pretty(&stripped.report).or_fail("write the report")?;
-        json.push(b'\n');
-        files::write(path, &json)?;
+        files::write(path, &files::json(&stripped.report, "write the report")?)?;
     }
     print!("{}", summary(&stripped.report));
     Ok(())

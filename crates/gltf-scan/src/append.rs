@@ -33,8 +33,6 @@ pub(super) struct Appender<'s> {
     /// Whether that buffer is the BIN chunk; if not, it is a new data URI.
     in_bin: bool,
     data: Vec<u8>,
-    /// The SHA-256 of the scan, in hexadecimal.
-    sha256: String,
 }
 
 /// The values of a new accessor.
@@ -108,13 +106,7 @@ impl<'s> Appender<'s> {
             start,
             in_bin,
             data: Vec::new(),
-            sha256: scan.digests().sha256.clone(),
         }
-    }
-
-    /// The SHA-256 of the scan, in hexadecimal.
-    pub fn sha256(&self) -> &str {
-        &self.sha256
     }
 
     /// Appends to the list `key` at the top of the JSON; returns the new element's index.
@@ -176,14 +168,17 @@ impl<'s> Appender<'s> {
         }
     }
 
-    /// Appends a buffer view; returns its index.
-    pub fn view(&mut self, name: &str, bytes: &[u8]) -> usize {
-        let view = json!({
+    /// Appends a buffer view, of vertices or indices if it has a target; returns its index.
+    pub fn view(&mut self, name: &str, bytes: &[u8], target: Option<BufferTarget>) -> usize {
+        let mut view = json!({
             "name": name,
             "buffer": self.buffer,
             "byteOffset": self.start + self.data.len(),
             "byteLength": bytes.len(),
         });
+        if let Some(target) = target {
+            view["target"] = json!(target as u32);
+        }
         self.data.extend_from_slice(bytes);
         // The next buffer view starts at a multiple of four.
         self.data.resize(self.data.len().next_multiple_of(4), 0);
@@ -194,14 +189,7 @@ impl<'s> Appender<'s> {
     pub fn accessor(&mut self, data: AccessorData<'_>) -> Value {
         let size = data.component.size() * data.kind.multiplicity();
         let count = data.bytes.len() / size;
-        let view = self.view(data.name, &data.bytes);
-        let made = self
-            .lists
-            .get_mut("bufferViews")
-            .and_then(|list| list.last_mut());
-        if let Some(made) = made.and_then(Value::as_object_mut) {
-            made.insert("target".into(), json!(data.target as u32));
-        }
+        let view = self.view(data.name, &data.bytes, Some(data.target));
         let mut accessor = json!({
             "name": data.name,
             "bufferView": view,
@@ -250,7 +238,7 @@ impl<'s> Appender<'s> {
         for (key, values) in &self.lists {
             edit.append(&[key], values)?;
         }
-        let text = undo::with_record(self.scan, &self.sha256, edit.finish())?.into_bytes();
+        let text = undo::with_record(self.scan, edit.finish())?.into_bytes();
         if layout.container == Container::Gltf {
             let head = bytes.get(..layout.json.start).unwrap_or_default();
             return Ok([head, &text].concat());

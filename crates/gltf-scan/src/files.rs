@@ -59,11 +59,7 @@ impl Companions {
 /// # Errors
 /// The JSON does not parse.
 pub fn sibling_paths(gltf: &[u8]) -> Result<Vec<String>, ScanError> {
-    let text = gltf.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(gltf);
-    let json = darn_json::value(text).map_err(|error| ScanError::Container {
-        offset: 0,
-        detail: format!("the JSON does not parse: {error}"),
-    })?;
+    let json = json_of_text(gltf)?;
     let list = |key: &str| {
         json.get(key)
             .and_then(Value::as_array)
@@ -76,6 +72,15 @@ pub fn sibling_paths(gltf: &[u8]) -> Result<Vec<String>, ScanError> {
         .filter(|uri| !uri.starts_with("data:"))
         .flat_map(paths)
         .collect())
+}
+
+/// The JSON of a glTF that is no GLB, with or without a byte order mark.
+pub(super) fn json_of_text(gltf: &[u8]) -> Result<Value, ScanError> {
+    let text = gltf.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(gltf);
+    darn_json::value(text).map_err(|error| ScanError::Container {
+        offset: 0,
+        detail: format!("the JSON does not parse: {error}"),
+    })
 }
 
 /// The paths that a relative URI may mean, the likeliest first: percent-decoded, then as spelled (many exporters do not

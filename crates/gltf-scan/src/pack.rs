@@ -8,7 +8,7 @@ use super::buffers::decode_data_uri;
 use super::compressed::{DecodeAllowance, meshopt};
 use super::container::{Container, layout, pack_glb};
 use super::error::ScanError;
-use super::files::Companions;
+use super::files::{Companions, json_of_text};
 use super::json::JsonPlace;
 use super::limits::ScanLimits;
 use super::scan::Scan;
@@ -67,11 +67,7 @@ fn packed(
     companions: &Companions,
     allowance: &DecodeAllowance<'_>,
 ) -> Result<Vec<u8>, ScanError> {
-    let text = gltf.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(gltf);
-    let mut json = darn_json::value(text).map_err(|error| ScanError::Container {
-        offset: 0,
-        detail: format!("the JSON does not parse: {error}"),
-    })?;
+    let mut json = json_of_text(gltf)?;
     let mut bin = Vec::new();
     let places = merge_buffers(&mut json, &mut bin, companions, allowance)?;
     for view in list(&mut json, "bufferViews") {

@@ -11,6 +11,7 @@ use serde_json::{Map, Value, json};
 use super::append::Appender;
 use super::error::ScanError;
 use super::hatch;
+use super::patch_primitive::is_reconstructed;
 use super::scan::Scan;
 use super::variants::{MaterialChoices, PatchMaterials};
 use super::xmp;
@@ -85,7 +86,7 @@ impl<'s> PatchMaterialsMaker<'s> {
             return Ok(*known);
         }
         let mut copy = self.source(source)?;
-        let own = is_reconstruction(&copy);
+        let own = is_reconstructed(copy.get("extras"));
         let made = match (source, own) {
             (Some(source), true) => source,
             _ => {
@@ -158,7 +159,7 @@ impl<'s> PatchMaterialsMaker<'s> {
     /// The texture of the hatch; it repeats, as textures do without a sampler.
     fn hatch(&mut self, out: &mut Appender<'_>) -> usize {
         *self.hatch.get_or_insert_with(|| {
-            let view = out.view("darn hatch", hatch::PNG);
+            let view = out.view("darn hatch", hatch::PNG, None);
             let image =
                 json!({ "name": "darn hatch", "bufferView": view, "mimeType": "image/png" });
             let image = out.push("images", image);
@@ -178,11 +179,6 @@ impl<'s> PatchMaterialsMaker<'s> {
             detail: "must be an object".into(),
         })
     }
-}
-
-fn is_reconstruction(material: &Map<String, Value>) -> bool {
-    let darn = material.get("extras").and_then(|extras| extras.get("darn"));
-    darn.and_then(|darn| darn.get("reconstructed")) == Some(&Value::Bool(true))
 }
 
 /// Names a material after what it is, and sets flags in `extras.darn`. Extras that are not an object cannot take them; the

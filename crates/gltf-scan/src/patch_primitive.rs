@@ -35,6 +35,11 @@ pub struct PatchPrimitive {
     pub method: Map<String, Value>,
 }
 
+/// Whether the extras of a primitive or a material say that it is darn's.
+pub(super) fn is_reconstructed(extras: Option<&Value>) -> bool {
+    extras.and_then(|extras| extras.pointer("/darn/reconstructed")) == Some(&Value::Bool(true))
+}
+
 /// A vertex of a patch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PatchPoint {

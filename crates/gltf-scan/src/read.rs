@@ -20,6 +20,7 @@ use super::error::ScanError;
 use super::files::{Companions, Siblings};
 use super::json::{JsonPlace, json_held, values_at_most};
 use super::limits::{Limit, ScanLimits};
+use super::patch_primitive::is_reconstructed;
 use super::primitive::{AttributeSource, ElementsKey, PrimitiveSource};
 use super::scan::{Scan, ScanPart, VertexBlock};
 use super::scene::{MeshNode, mesh_nodes};
@@ -324,8 +325,7 @@ impl<'d, 'a> ScanReader<'d, 'a> {
             texcoords,
             colors,
             normals,
-            reconstructed: place.value.pointer("/extras/darn/reconstructed")
-                == Some(&Value::Bool(true)),
+            reconstructed: is_reconstructed(place.value.get("extras")),
             hatch: (place.value.pointer("/extras/darn/hatch"))
                 .and_then(|set| usize::try_from(set.as_u64()?).ok()),
             shared: instance.shared,

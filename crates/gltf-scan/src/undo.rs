@@ -32,15 +32,11 @@ pub(super) fn extras() -> Value {
     json!({ "darn": { "undo": PLACEHOLDER } })
 }
 
-/// An edited text with the record of its edits in place of the [`PLACEHOLDER`]; `digest` is the scan's SHA-256.
+/// An edited text with the record of its edits in place of the [`PLACEHOLDER`].
 ///
 /// # Errors
 /// [`ScanError::Invalid`] where the placeholder is missing.
-pub(super) fn with_record(
-    scan: &Scan,
-    digest: &str,
-    edited: EditedText,
-) -> Result<String, ScanError> {
+pub(super) fn with_record(scan: &Scan, edited: EditedText) -> Result<String, ScanError> {
     let (bytes, layout) = (&scan.bytes, &scan.layout);
     let edits = edited.splices.into_iter().map(|splice| {
         let mut edit = vec![json!(splice.at), json!(splice.inserted)];
@@ -50,7 +46,7 @@ pub(super) fn with_record(
         Value::Array(edit)
     });
     let mut record = json!({
-        "sha256": digest,
+        "sha256": scan.digests().sha256,
         "json": layout.json.len(),
         "edits": edits.collect::<Vec<_>>(),
     });

@@ -8,6 +8,7 @@ use std::collections::BTreeSet;
 
 use serde_json::{Map, Value};
 
+use super::patch_primitive::is_reconstructed;
 use super::variants;
 use super::xmp;
 
@@ -53,7 +54,7 @@ fn primitives(json: &Value) -> impl Iterator<Item = (usize, &Value)> {
 }
 
 fn is_patch(primitive: &Value) -> bool {
-    primitive.pointer("/extras/darn/reconstructed") == Some(&Value::Bool(true))
+    is_reconstructed(primitive.get("extras"))
 }
 
 /// Takes out what darn added; `None` if there is nothing. Returns what a person should know.
@@ -235,7 +236,8 @@ fn remove_variants(json: &mut Value) {
     };
     let left = remove_last(
         json,
-        (variants::EXTENSION, variants::VARIANTS),
+        variants::EXTENSION,
+        variants::VARIANTS,
         |index, variant| is_own(variant) && !mapped.contains(&index),
     );
     if left == Some(0) && !is_used {
@@ -279,7 +281,7 @@ fn remove_packets(json: &mut Value) {
         .filter_map(|key| json.get(*key)?.as_array());
     let mut used: BTreeSet<u64> = lists.flatten().filter_map(packet).collect();
     used.extend(json.get("asset").and_then(packet));
-    let left = remove_last(json, (xmp::EXTENSION, xmp::PACKETS), |index, packet| {
+    let left = remove_last(json, xmp::EXTENSION, xmp::PACKETS, |index, packet| {
         xmp::is_own(packet) && !used.contains(&index)
     });
     if left == Some(0) && used.is_empty() {
@@ -290,7 +292,8 @@ fn remove_packets(json: &mut Value) {
 /// Removes elements from the end of a list of an extension while `goes` says so; returns how many are left.
 fn remove_last(
     json: &mut Value,
-    (extension, list): (&str, &str),
+    extension: &str,
+    list: &str,
     goes: impl Fn(u64, &Value) -> bool,
 ) -> Option<usize> {
     let list = json.pointer_mut(&format!("/extensions/{extension}/{list}"))?;

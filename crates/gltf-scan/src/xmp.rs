@@ -40,7 +40,7 @@ pub(super) fn append_packet(scan: &Scan, out: &mut Appender<'_>, holes: usize) -
             "rdf": "http://www.w3.org/1999/02/22-rdf-syntax-ns#",
             "xmp": "http://ns.adobe.com/xap/1.0/",
         },
-        "dc:source": format!("urn:sha256:{}", out.sha256()),
+        "dc:source": format!("urn:sha256:{}", scan.digests().sha256),
         "dc:description": {
             "@type": "rdf:Alt",
             "rdf:_1": { "@language": "en", "@value": words },

@@ -17,9 +17,6 @@ use darn_geometry::mesh::layers::Layers;
 use darn_geometry::mesh::region::{self, Region};
 use darn_geometry::patch::{FairPatch, PatchWork};
 
-/// Nanoseconds of work a block of the scan's faces in the search for other layers near a hole.
-const LAYERS_WORK: u64 = 10;
-
 /// A hole without a chart, and the fair surface that closes it.
 pub struct FairHole {
     /// The loop's id.
@@ -68,7 +65,7 @@ impl FairHole {
                 None => Ok(fair),
             })
             .map_err(MendError::patch(id))?;
-        budget.spend(LAYERS_WORK * welded.blocks.len() as u64)?;
+        budget.spend(welded.blocks.search_work())?;
         // No point of the patch is farther from the rim than this.
         let margin = fair.patch.beyond_rim();
         let layers = Layers::near(&whole, &welded.blocks, &region, margin, &[]);

@@ -30,6 +30,7 @@ mod edit;
 mod error;
 mod fair_hole;
 mod fill_hole;
+mod formed_scan;
 mod hole;
 mod hole_report;
 mod inpainter;

@@ -9,10 +9,10 @@ use darn_contract::port::{
     EditSession, HolesQuery, Mended, Mender, PatchForm, Patches, Refusal, ScanForm, Stripped,
 };
 use darn_contract::{Constraints, Search, error_chain, v1};
-use darn_gltf_scan::{Container, Scan, repacked};
+use darn_gltf_scan::{Container, Scan};
 
-use crate::digests::file_digests;
 use crate::error::MendError;
+use crate::formed_scan::formed;
 use crate::mender::{Call, NetworkMender};
 use crate::session::ScanSession;
 use crate::timings::add_read_time;
@@ -62,23 +62,16 @@ impl Mender for SharedMender {
         form: ScanForm,
         budget: &Budget<'_>,
     ) -> Result<Mended, Refusal> {
-        let container = match form {
-            _ if mended.media_type != Container::Zip.media_type() => return Ok(mended),
-            ScanForm::AsReceived => return Ok(mended),
-            ScanForm::Gltf => Container::Gltf,
-            ScanForm::Glb => Container::Glb,
-        };
-        let limits = &self.0.scan_limits;
-        let (container, bytes) = repacked(mended.bytes, container, limits, budget)
-            .map_err(|error| refusal(MendError::unreadable(error)))?;
-        let mut report = mended.report;
-        // The glTF of a zip is the same outside; packed with its files, it is another.
-        if form == ScanForm::Glb {
-            report.output = Some(file_digests(&bytes));
+        if mended.media_type != Container::Zip.media_type() {
+            return Ok(mended);
         }
+        let limits = &self.0.scan_limits;
+        let scan = formed(mended.bytes, form, limits, budget).map_err(refusal)?;
+        let mut report = mended.report;
+        report.output = scan.digests.or(report.output);
         Ok(Mended {
-            bytes,
-            media_type: container.media_type(),
+            bytes: scan.bytes,
+            media_type: scan.container.media_type(),
             report,
         })
     }

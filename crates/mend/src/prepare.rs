@@ -40,9 +40,6 @@ const TUBE_STRETCH: f64 = 1.05;
 const MAX_TRIES: usize = 4;
 /// Tries with more and more of the cloth at the rim left out.
 const MISFIT_SEARCHES: usize = 4;
-/// Nanoseconds of work a block of the scan's faces in the search for other layers near a hole.
-const LAYERS_WORK: u64 = 10;
-
 /// Prepares the hole of a loop, from the sound edge of its cloth: pieces at the rim that do not belong to it are left
 /// out. Where that gives no hole, from the rim as it was scanned.
 ///
@@ -346,8 +343,7 @@ impl Preparation<'_> {
         .map_err(MendError::patch(id))?;
         // The largest distance that cloth of the hole's extent can have from its rim.
         let beyond = 0.5 * extent(&rim_uv) * flat.chart.frame.side;
-        call.budget
-            .spend(LAYERS_WORK * self.cloth.blocks.len() as u64)?;
+        call.budget.spend(self.cloth.blocks.search_work())?;
         let layers = Layers::near(
             self.cloth.whole,
             self.cloth.blocks,

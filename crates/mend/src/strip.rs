@@ -4,11 +4,12 @@ use bytes::Bytes;
 use darn_budget::Budget;
 use darn_contract::port::{ScanForm, Stripped};
 use darn_contract::v1;
-use darn_gltf_scan::{Container, ScanLimits, repacked, stripped};
+use darn_gltf_scan::{Container, ScanLimits, stripped};
 
 use crate::VERSION;
-use crate::digests::{self, file_digests};
+use crate::digests;
 use crate::error::MendError;
+use crate::formed_scan::{FormedScan, formed};
 
 /// Takes everything out of a scan that darn put in: a GLB; a glTF, whose other files are not needed; or a zip, which
 /// comes back in the form that is asked for.
@@ -33,23 +34,19 @@ pub fn strip(
         input: Some(digests::message(found.input)),
         output: Some(digests::message(found.output)),
     };
-    let wanted = match form {
-        _ if found.container != Container::Zip => found.container,
-        ScanForm::AsReceived => Container::Zip,
-        ScanForm::Gltf => Container::Gltf,
-        ScanForm::Glb => Container::Glb,
+    let scan = match found.container {
+        Container::Zip => formed(found.bytes, form, limits, budget)?,
+        container => FormedScan {
+            bytes: found.bytes,
+            container,
+            digests: None,
+        },
     };
-    let (container, bytes) = match found.container == wanted {
-        true => (wanted, found.bytes),
-        false => repacked(found.bytes, wanted, limits, budget).map_err(MendError::unreadable)?,
-    };
-    if found.container == Container::Zip && wanted == Container::Glb {
-        report.output = Some(file_digests(&bytes));
-    }
-    budget.check_output(bytes.len())?;
+    report.output = scan.digests.or(report.output);
+    budget.check_output(scan.bytes.len())?;
     Ok(Stripped {
-        bytes,
-        media_type: container.media_type(),
+        bytes: scan.bytes,
+        media_type: scan.container.media_type(),
         report,
     })
 }
@@ -62,6 +59,7 @@ mod tests {
     use darn_gltf_scan::Scan;
 
     use super::*;
+    use crate::digests::file_digests;
     use crate::testing::{mender, scan_of};
 
     fn mended(scan: &[u8], constraints: &Constraints) -> Vec<u8> {

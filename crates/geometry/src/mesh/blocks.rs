@@ -5,6 +5,8 @@ use super::bounds::Bounds;
 
 /// Faces of a block. Faces that follow each other in a file mostly lie side by side.
 const BLOCK: usize = 128;
+/// Nanoseconds of work a block in a search.
+const BLOCK_WORK: u64 = 10;
 
 /// The boxes of the blocks of a mesh.
 #[derive(Debug, Clone, Default)]
@@ -36,14 +38,9 @@ impl FaceBlocks {
         meeting.flat_map(|(k, _)| BLOCK * k..self.faces.min(BLOCK * (k + 1)))
     }
 
-    /// How many blocks there are.
-    pub fn len(&self) -> usize {
-        self.blocks.len()
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.blocks.is_empty()
+    /// Nanoseconds of work of a search for what is near a place.
+    pub fn search_work(&self) -> u64 {
+        BLOCK_WORK * self.blocks.len() as u64
     }
 }
 

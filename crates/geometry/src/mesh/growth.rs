@@ -53,17 +53,15 @@ impl<'a> Growth<'a> {
             loops,
         } = whole;
         budget.spend(VERTEX_WORK * mesh.positions.len() as u64)?;
-        let mut touching = vec![false; mesh.faces.len()];
-        for f in rim.vertices.iter().flat_map(|&v| topology.faces_at(v)) {
-            touching[f.index()] = true;
-        }
         let mut near: Vec<FaceId> = (rim.vertices.iter())
             .flat_map(|&v| topology.faces_at(v))
             .collect();
         near.sort_unstable();
         near.dedup();
+        let mut touching = vec![false; mesh.faces.len()];
         let (mut length, mut count) = (0.0, 0.0);
         for f in &near {
+            touching[f.index()] = true;
             let [a, b, c] = mesh.triangle(f.index());
             length += (b - a).norm() + (c - b).norm() + (a - c).norm();
             count += 3.0;

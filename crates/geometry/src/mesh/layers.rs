@@ -18,7 +18,8 @@ pub struct Layers {
 }
 
 impl Layers {
-    /// The faces of the whole mesh, whose `blocks` are given, outside `region` whose bounding boxes come within `margin` (scene units) of the rim's.
+    /// The faces outside `region` whose bounding boxes come within `margin` (scene units) of the rim's. `blocks` are those of
+    /// the whole mesh.
     ///
     /// A face with a vertex on the rim is left out: it touches the patch there and does not cut it. So are the faces `left`:
     /// they are no cloth, and may lie where the cloth was.
