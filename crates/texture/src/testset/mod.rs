@@ -1,0 +1,73 @@
+//! A test set with known answers: ten fabrics, three layouts, three sizes of holes, and what other fillers make of them.
+
+mod fabric;
+mod metrics;
+mod peers;
+mod scan;
+
+pub use fabric::{FABRICS, Fabric};
+pub use metrics::{Comparison, Scores, ciede2000, lab};
+pub use peers::{Peer, continued};
+pub use scan::{HOLES, LAYOUTS, Layout, TestScan};
+
+use darn_budget::Budget;
+
+use crate::{Completion, ContinuedScore, PatchTexture, Settings, TextureError};
+
+/// What fillers make of one hole.
+pub struct Trial {
+    /// Columns of all pictures.
+    pub width: usize,
+    /// The truth.
+    pub truth: Vec<[u8; 4]>,
+    /// The completion, [`Peer::Continue`] and [`Peer::Average`].
+    pub made: [Vec<[u8; 4]>; 3],
+    /// Their scores.
+    pub scores: [Scores; 3],
+    /// What [`Completion::score_continued`] says of [`Peer::Continue`].
+    pub continued: ContinuedScore,
+}
+
+impl Trial {
+    /// Completes a hole by all fillers and scores them.
+    ///
+    /// # Errors
+    /// As [`Completion::new`].
+    pub fn new(scan: &TestScan) -> Result<Trial, TextureError> {
+        let budget = Budget::unlimited();
+        let cloth = scan.cloth();
+        let completion = Completion::new(&cloth, &scan.patch, &Settings::default(), budget)?;
+        let PatchTexture { width, layers, .. } = completion.texture(budget)?;
+        let texture = layers.into_iter().next().unwrap_or_default();
+        let byte = |x: f32| (255.0 * x + 0.5) as u8;
+        let truth: Vec<[u8; 4]> = (completion.places().into_iter())
+            .map(|p| {
+                let [r, g, b] = scan.truth(p).map(byte);
+                [r, g, b, 255]
+            })
+            .collect();
+        let peers = [Peer::Continue, Peer::Average].map(|peer| continued(scan, peer));
+        let image = |k: usize| completion.continued_image(&peers[k], budget);
+        let made = [texture, image(0)?, image(1)?];
+        let [hole, known] = completion.masks();
+        let width = width as usize;
+        let scores = made.each_ref().map(|made| {
+            let comparison = Comparison {
+                width,
+                made,
+                truth: &truth,
+                hole: &hole,
+                known: &known,
+            };
+            comparison.scores(scan.fabric.periods())
+        });
+        let continued = completion.score_continued(&peers[0], budget)?;
+        Ok(Trial {
+            width,
+            truth,
+            made,
+            scores,
+            continued,
+        })
+    }
+}
