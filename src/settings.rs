@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use darn_budget::{Budget, Limits};
 use darn_gltf_scan::ScanLimits;
+use darn_mend::NetworkMender;
 use darn_serve::ServeArgs;
 
 /// Serve HTTP and gRPC.
@@ -21,6 +22,9 @@ pub struct ServeCommand {
 
     #[command(flatten)]
     pub size: SizeArgs,
+
+    #[command(flatten)]
+    pub texture: TextureArgs,
 
     #[command(flatten)]
     pub network: NetworkArgs,
@@ -46,6 +50,21 @@ impl SizeArgs {
             max_vertices: self.max_vertices,
             ..ScanLimits::default()
         }
+    }
+}
+
+/// The images that patches get.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct TextureArgs {
+    /// Most texels of a side of a patch's own texture, with the cloth around it that it is completed from
+    #[arg(long, env = "DARN_PATCH_TEXTURE", value_name = "N", default_value = "2048", value_parser = clap::value_parser!(u32).range(64..=8192))]
+    pub patch_texture: u32,
+}
+
+impl TextureArgs {
+    /// Sets them for the mends of a mender.
+    pub fn apply(self, mender: &mut NetworkMender) {
+        mender.limits.texture.max_side = self.patch_texture;
     }
 }
 

@@ -6,6 +6,7 @@ use super::garments::made;
 use super::mended::{listed, mended, mended_at};
 use super::network::mender;
 use super::progress::WorkProgress;
+use super::texture_table;
 use crate::settings::NetworkArgs;
 use darn_geometry::grid::NormalGrid;
 use darn_geometry::mesh::TriMesh;
@@ -24,11 +25,14 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 pub struct EvaluateArgs {
     /// Folder of sheets to be measured on, as `darn scarffolds` makes it; none of them may have been trained on
-    #[arg(long, required_unless_present = "garments")]
+    #[arg(long, required_unless_present_any = ["garments", "texture"])]
     sheets: Option<PathBuf>,
     /// Mend a set of garments end to end instead, as `darn garments` makes it; without a folder, two of each kind are made from the seed
     #[arg(long, value_name = "DIR", num_args = 0..=1, conflicts_with_all = ["sheets", "noise", "picture", "upright", "scans", "masks", "once"])]
     garments: Option<Option<PathBuf>>,
+    /// Complete the texture of ten fabrics in three layouts and three sizes of holes instead; with a folder, pictures go there
+    #[arg(long, value_name = "DIR", num_args = 0..=1, conflicts_with_all = ["sheets", "garments", "noise", "picture", "upright", "scans", "masks", "once"])]
+    texture: Option<Option<PathBuf>>,
     /// Measure the mended garments of another filler instead: a folder with a GLB of the hole's name for each
     #[arg(long, value_name = "FOLDER", requires = "garments")]
     mended: Option<PathBuf>,
@@ -69,6 +73,9 @@ pub struct EvaluateArgs {
 pub fn run(args: &EvaluateArgs) -> Result<(), Failure> {
     if let Some(set) = &args.garments {
         return garments(args, set.as_deref());
+    }
+    if let Some(pictures) = &args.texture {
+        return texture_table::run(pictures.as_deref(), args.json.as_deref());
     }
     let folder = args.sheets.clone().unwrap_or_default();
     let name = folder.display();

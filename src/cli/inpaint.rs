@@ -6,7 +6,7 @@ use super::holes::{kind_name, set_aside};
 use super::network::mender;
 use super::progress::WorkProgress;
 use super::provenance;
-use crate::settings::{DeadlineArgs, NetworkArgs, SizeArgs};
+use crate::settings::{DeadlineArgs, NetworkArgs, SizeArgs, TextureArgs};
 use darn_contract::v1::{HoleReport, Report};
 use darn_contract::{Constraints, FieldError};
 use darn_mend::Call;
@@ -35,6 +35,8 @@ pub struct InpaintArgs {
     #[command(flatten)]
     size: SizeArgs,
     #[command(flatten)]
+    texture: TextureArgs,
+    #[command(flatten)]
     deadline: DeadlineArgs,
     #[command(flatten)]
     network: NetworkArgs,
@@ -54,7 +56,8 @@ pub fn run(args: &InpaintArgs) -> Result<(), Failure> {
     let scan = files::read_scan(&args.scan, &args.size, &budget)?;
     let read = started.elapsed();
     progress.stage("loading weights");
-    let mender = mender(&args.network)?;
+    let mut mender = mender(&args.network)?;
+    args.texture.apply(&mut mender);
     progress.stage("mending");
     let call = Call {
         mender: &mender,
@@ -129,8 +132,13 @@ fn summary(report: &Report) -> String {
             n => format!(", {n} self-intersections"),
         };
         text.push_str(&format!(
-            "hole {}: rim of {} vertices, length {:.4}; patched with {} faces, stretch {:.3}{crossings}\n",
-            hole.id, hole.vertices, hole.length, patch.faces, patch.stretch_mean
+            "hole {}: rim of {} vertices, length {:.4}; patched with {} faces, stretch {:.3}{crossings}{}\n",
+            hole.id,
+            hole.vertices,
+            hole.length,
+            patch.faces,
+            patch.stretch_mean,
+            texture(hole)
         ));
         text.push_str(&distances(hole));
     }
@@ -151,6 +159,16 @@ fn summary(report: &Report) -> String {
         text.push_str(&format!("note: {note}\n"));
     }
     text
+}
+
+/// What a patch's line says about images of its own.
+fn texture(hole: &HoleReport) -> String {
+    match &hole.texture {
+        Some(own) if own.layers > 0 => {
+            format!(", a texture of {} x {} texels", own.width, own.height)
+        }
+        _ => String::new(),
+    }
 }
 
 /// One line for each anchor or gesture: its distance to the cloth.

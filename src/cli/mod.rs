@@ -23,10 +23,13 @@ mod provenance;
 mod render;
 #[cfg(feature = "burn")]
 mod samples;
+mod scan_paint;
 #[cfg(feature = "burn")]
 mod scarffolds;
 mod serve;
 mod strip;
+#[cfg(feature = "burn")]
+mod texture_table;
 #[cfg(feature = "burn")]
 mod train;
 

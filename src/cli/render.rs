@@ -1,15 +1,19 @@
-//! `darn render`: a picture of a scan; reconstructed cloth has another colour.
+//! `darn render`: a picture of a scan; reconstructed cloth has another colour, or all has the scan's own.
 
 use super::failure::{Failure, OrFail};
 use super::files;
+use super::scan_paint::ScanPaint;
 use crate::settings::SizeArgs;
 use darn_budget::Budget;
+use darn_geometry::mesh::index::FaceId;
+use darn_geometry::mesh::weld::WeldedMesh;
 use darn_geometry::mesh::{Vec3, weld};
 use darn_gltf_scan::Scan;
 use darn_render::{
-    CLOTH, CameraDirection, EdgeLines, Framing, MAX_SIDE, MENDED, PictureOptions, picture,
+    CLOTH, CameraDirection, EdgeLines, FacePlace, Framing, MAX_SIDE, MENDED, PictureOptions,
+    painted, picture,
 };
-use image::ImageFormat;
+use image::{ImageFormat, RgbImage};
 use std::io::Cursor;
 use std::path::PathBuf;
 
@@ -32,6 +36,12 @@ pub struct RenderArgs {
     /// Draw every edge, not only boundaries
     #[arg(long)]
     wireframe: bool,
+    /// Draw the scan's own colours, without its lights and normal maps
+    #[arg(long)]
+    colours: bool,
+    /// Draw the scan's own colours in this material variant, such as "Reconstruction marked"
+    #[arg(long, value_name = "NAME")]
+    variant: Option<String>,
     #[command(flatten)]
     limits: SizeArgs,
 }
@@ -40,17 +50,41 @@ pub struct RenderArgs {
 pub fn run(args: &RenderArgs) -> Result<(), Failure> {
     let scan = files::read_scan(&args.scan, &args.limits, Budget::unlimited())?;
     let welded = weld::weld(&scan.surface);
-    let tints: Vec<[u8; 3]> = welded
-        .soup_face
-        .iter()
-        .map(|&face| tint(&scan, face))
-        .collect();
-    let image = picture(&welded.mesh, &tints, &args.options());
+    let image = match args.colours || args.variant.is_some() {
+        true => coloured(&scan, &welded, args)?,
+        false => {
+            let faces = welded.soup_face.iter();
+            let tints: Vec<[u8; 3]> = faces.map(|&face| tint(&scan, face)).collect();
+            picture(&welded.mesh, &tints, &args.options())
+        }
+    };
     let mut png = Cursor::new(Vec::new());
     image
         .write_to(&mut png, ImageFormat::Png)
         .or_fail("encode the picture")?;
     files::write(&args.output, &png.into_inner())
+}
+
+/// The picture in the scan's own colours.
+fn coloured(scan: &Scan, welded: &WeldedMesh, args: &RenderArgs) -> Result<RgbImage, Failure> {
+    let variant =
+        match &args.variant {
+            Some(name) => Some(scan.variant(name).ok_or_else(|| {
+                Failure::Usage(format!("the scan has no material variant {name:?}"))
+            })?),
+            None => None,
+        };
+    let paint = ScanPaint::new(scan, variant, &args.limits.limits());
+    let at = |place: &FacePlace| {
+        let face = FaceId(place.face as u32);
+        let part = (welded.soup_face.get(place.face)).and_then(|face| scan.part_of_face(*face));
+        let corners = welded.soup_corners(&scan.surface, face);
+        match part.zip(corners) {
+            Some((part, corners)) => paint.at(part, corners, place.weights),
+            None => [1.0; 3],
+        }
+    };
+    Ok(painted(&welded.mesh, &at, &args.options()))
 }
 
 impl RenderArgs {

@@ -26,10 +26,12 @@ pub fn run(settings: &ServeCommand) -> Result<(), Failure> {
         .num_threads(settings.threads.unwrap_or(0))
         .build_global())
     .or_fail("start the threads of mends (DARN_THREADS)")?;
-    let mender = Arc::new(NetworkMender {
+    let mut mender = NetworkMender {
         scan_limits: settings.size.limits(),
         ..network::mender(&settings.network)?
-    });
+    };
+    settings.texture.apply(&mut mender);
+    let mender = Arc::new(mender);
     let idle = Arc::clone(&mender);
     allocator::give_back_when_idle(move |unused| idle.release_idle(unused));
     darn_serve::run(serve, Arc::new(SharedMender(mender))).or_fail("serve")

@@ -3,6 +3,7 @@
 mod bodies;
 mod borders;
 mod cloth;
+mod colours;
 mod compressed;
 mod cuts;
 mod editing;

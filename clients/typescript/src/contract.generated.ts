@@ -362,6 +362,8 @@ export interface components {
             except?: number[];
             /** @description Whether a patch is applied that is no plausible cloth (stretched beyond measure, cutting itself). Otherwise its loop is skipped with the code `no_plausible_fill`. */
             acceptDoubtful?: boolean;
+            /** @description Where the patches' colours come from: `synthesize` (images of their own, completed from the cloth around the hole), `continue` (the scan's texture coordinates and colours go on from the rim), `flat` (one colour, the mean of the cloth around) or `none` (grey). Left out: `continue` where that looks like the cloth around the hole, otherwise `synthesize`. */
+            texture?: string;
         };
         /** @description One hole, by exactly one of its fields. */
         HoleSelector: {
@@ -674,6 +676,25 @@ export interface components {
             leftFaces?: number;
             /** @description Why the patch is no plausible cloth, each reason for a person; empty for a sound patch. Applied only when the request accepts doubtful patches. */
             doubts?: string[];
+            /** @description Where the patch's colour comes from; left out where the mended scan was not written. */
+            texture?: components["schemas"]["TextureReport"];
+        };
+        /** @description Where a patch's colour comes from. */
+        TextureReport: {
+            /** @description `synthesized`, `continued`, `flat` or `none`; the words of the request as what was done. */
+            method?: string;
+            /** @description Why, for a person; empty where the request said so. */
+            reason?: string;
+            /** @description Columns of its own images, in texels; 0 without images. */
+            width?: number;
+            /** @description Rows of its own images, in texels. */
+            height?: number;
+            /** @description How many images of its own it has: base colour, normals and so on, for each variant. */
+            layers?: number;
+            /** @description How unlike the cloth around the hole its continued texture coordinates show it, from 0 to about 1; left out where that was not compared. */
+            continuedDifference?: number;
+            /** @description How unlike itself the cloth around the hole is, in the same measure. */
+            clothDifference?: number;
         };
         /** @description Cloth that was cut out before a hole was filled. */
         CutReport: {
@@ -814,6 +835,8 @@ export interface components {
             write?: number;
             /** @description Everything. */
             total?: number;
+            /** @description Colouring the patches: decoding the scan's images, and completing them. */
+            texture?: number;
         };
         /** @description Milliseconds spent on one hole. */
         HoleTimings: {
@@ -829,6 +852,8 @@ export interface components {
             patch?: number;
             /** @description Checking the patch. */
             report?: number;
+            /** @description Its texture. */
+            texture?: number;
         };
         /**
          * @description What a boundary loop is.

@@ -202,6 +202,11 @@ impl<'a> Budget<'a> {
         self.held.load(Relaxed)
     }
 
+    /// Bytes that this request may still hold, whatever other requests hold.
+    pub fn memory_left(&self) -> usize {
+        self.limits.memory.saturating_sub(self.held())
+    }
+
     /// Gives back memory counted by [`Budget::hold`].
     pub fn release(&self, bytes: usize) {
         if self.limits.memory == usize::MAX && self.limits.pool.is_none() {

@@ -56,6 +56,21 @@ pub struct Constraints {
     pub except: Vec<u32>,
     /// Whether patches that are no plausible cloth are applied.
     pub accept_doubtful: bool,
+    /// Where the patches' colours come from; `None` leaves it to the mender.
+    pub texture: Option<TextureChoice>,
+}
+
+/// Where the colour of a patch comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TextureChoice {
+    /// Images of its own, completed from the cloth around it.
+    Synthesize,
+    /// The scan's texture coordinates and colours, continued from the rim.
+    Continue,
+    /// One colour: the mean of the cloth around it.
+    Flat,
+    /// Grey.
+    None,
 }
 
 /// Kinds of loops to fill. None of them includes outer boundaries.
@@ -177,6 +192,7 @@ impl Constraints {
         };
         errors.name("/weights", message.weights.as_deref());
         let fill = (message.fill.as_deref()).and_then(|fill| errors.fill(fill));
+        let texture = (message.texture.as_deref()).and_then(|texture| errors.texture(texture));
         let diameters = Diameters {
             max: errors.diameter("/maxDiameter", message.max_diameter),
             min: errors.diameter("/minDiameter", message.min_diameter),
@@ -200,6 +216,7 @@ impl Constraints {
                 diameters,
                 except: message.except.clone(),
                 accept_doubtful: message.accept_doubtful,
+                texture,
             })
         } else {
             Err(errors.0)
@@ -271,6 +288,22 @@ impl FieldErrors {
                 let got = excerpt(other);
                 let detail = format!("expected `holes`, `openings` or `all`; got `{got}`");
                 self.push("/fill", detail);
+                None
+            }
+        }
+    }
+
+    fn texture(&mut self, texture: &str) -> Option<TextureChoice> {
+        match texture {
+            "synthesize" => Some(TextureChoice::Synthesize),
+            "continue" => Some(TextureChoice::Continue),
+            "flat" => Some(TextureChoice::Flat),
+            "none" => Some(TextureChoice::None),
+            other => {
+                let got = excerpt(other);
+                let detail =
+                    format!("expected `synthesize`, `continue`, `flat` or `none`; got `{got}`");
+                self.push("/texture", detail);
                 None
             }
         }

@@ -30,6 +30,8 @@ pub(super) struct PatchKind {
     mesh: usize,
     /// Number of the materials.
     materials: usize,
+    /// Number of the appearance.
+    appearance: usize,
     hatch: Option<usize>,
     both_sides: bool,
     normals: bool,
@@ -103,13 +105,14 @@ impl<'s> CheckedPatch<'s> {
     }
 
     /// What patches must have in common to share a primitive; `materials` is a number of the materials that the part has
-    /// whose look it takes.
-    pub fn kind(&self, materials: usize) -> PatchKind {
-        let kinds = self.look.color_kinds.iter();
+    /// whose look it takes, `appearance` one of its appearance.
+    pub fn kind(&self, materials: usize, appearance: usize) -> PatchKind {
+        let kinds = self.look.color_kinds.iter().take(self.patch.colors.len());
         PatchKind {
             node: self.home.node,
             mesh: self.home.mesh,
             materials,
+            appearance,
             hatch: self.look.hatch,
             both_sides: self.patch.both_sides,
             normals: self.look.normals.is_some(),
@@ -138,6 +141,31 @@ impl<'s> CheckedPatch<'s> {
             .collect()
     }
 
+    /// Tangents in the node's space, at right angles to the normals; none unless a texture needs them.
+    pub fn tangents(&self, normals: &[[f32; 3]]) -> Vec<[f32; 4]> {
+        let Some(own) = self.patch.appearance.own().filter(|own| own.has_normals()) else {
+            return Vec::new();
+        };
+        let to_node = (self.home.transform.inverse())
+            .map_or_else(nalgebra::Matrix3::identity, |inverse| inverse.linear);
+        let handedness = if self.home.transform.mirrors() {
+            -1.0
+        } else {
+            1.0
+        };
+        (own.tangents.iter().zip(normals))
+            .map(|([x, y, z, w], normal)| {
+                let normal = Vec3::from(normal.map(f64::from));
+                let along = to_node * Vec3::from([*x, *y, *z].map(f64::from));
+                let across = along - normal * normal.dot(&along);
+                let unit = (across.try_normalize(1e-9 * along.norm()))
+                    .unwrap_or_else(|| any_across(&normal));
+                let [x, y, z]: [f32; 3] = unit.map(|x| x as f32).into();
+                [x, y, z, w * handedness]
+            })
+            .collect()
+    }
+
     /// The scan's normal at a patch point that is a vertex of `look`, if it has unit length.
     fn stored_normal(&self, point: &PatchPoint) -> Option<[f32; 3]> {
         let PatchPoint::Scan(vertex) = *point else {
@@ -148,6 +176,19 @@ impl<'s> CheckedPatch<'s> {
         let unit = (stored.iter().map(|x| x * x).sum::<f32>() - 1.0).abs() < UNIT;
         (self.look.node == self.home.node && unit).then_some(stored)
     }
+}
+
+/// A unit vector at right angles to a unit vector.
+fn any_across(normal: &Vec3) -> Vec3 {
+    let axis = if normal.x.abs() < 0.5 {
+        Vec3::x()
+    } else {
+        Vec3::y()
+    };
+    normal
+        .cross(&axis)
+        .try_normalize(0.0)
+        .unwrap_or_else(Vec3::x)
 }
 
 /// Checks that a patch has faces over its points, and finite attributes, as many as the part whose look it takes.
@@ -163,9 +204,20 @@ fn check_values(patch: &PatchPrimitive, look: &ScanPart) -> Result<(), String> {
     if look.normals.is_some() {
         expect_count(patch.normals.len(), n, "normals")?;
     }
-    let sets = patch.texcoords.len();
-    expect_count(sets, look.texcoords.len(), "texture coordinate sets")?;
-    expect_count(patch.colors.len(), look.colors.len(), "colour sets")?;
+    let [texcoords, colors] = (patch.appearance).sets([look.texcoords.len(), look.colors.len()]);
+    expect_count(patch.texcoords.len(), texcoords, "texture coordinate sets")?;
+    expect_count(patch.colors.len(), colors, "colour sets")?;
+    if let Some(own) = patch.appearance.own() {
+        expect_count(own.tangents.len(), n, "tangents")?;
+        expect_count(own.layers.len(), own.look.layers.len(), "images")?;
+        let texels = own.width as usize * own.height as usize;
+        for layer in own.layers.iter() {
+            expect_count(layer.len(), texels, "texels")?;
+        }
+        if texels == 0 || !own.tangents.iter().flatten().all(|x| x.is_finite()) {
+            return Err("an image without texels, or a tangent that is not finite".into());
+        }
+    }
     for set in &patch.texcoords {
         expect_count(set.len(), n, "texture coordinates")?;
     }

@@ -120,6 +120,7 @@ fn a_patch_is_plain_and_the_compressed_bytes_stay() {
             colors: Vec::new(),
             faces: vec![[0, 1, 2]],
             both_sides: false,
+            appearance: Default::default(),
             hole: Default::default(),
             method: Default::default(),
         };

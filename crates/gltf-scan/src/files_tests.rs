@@ -54,6 +54,7 @@ fn patch() -> PatchPrimitive {
         colors: Vec::new(),
         faces: vec![[0, 1, 2]],
         both_sides: false,
+        appearance: Default::default(),
         hole: Default::default(),
         method: Default::default(),
     }

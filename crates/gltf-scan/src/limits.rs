@@ -21,6 +21,8 @@ pub struct ScanLimits {
     pub max_morph_targets: usize,
     /// Bytes that the compressed streams of a scan decode to together.
     pub max_decoded_bytes: usize,
+    /// Texels of one image that is decoded for the texture of a patch.
+    pub max_image_texels: usize,
     /// Values in the JSON, keys included; an upper estimate, made before they are parsed.
     pub max_json_values: usize,
 }
@@ -36,6 +38,7 @@ impl Default for ScanLimits {
             max_attribute_sets: 16,
             max_morph_targets: 1024,
             max_decoded_bytes: 1 << 29,
+            max_image_texels: 1 << 27,
             max_json_values: 1_000_000,
         }
     }

@@ -3,6 +3,7 @@
 //! `extras.darn` of the primitive says that it is reconstructed, by which version and weights, and names each hole with
 //! its own range of the indices and of the vertices (`holes`).
 
+use darn_budget::Budget;
 use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::mesh::TRIANGLES;
 use serde_json::{Map, Value, json};
@@ -12,7 +13,10 @@ use super::buffers::BufferTarget;
 use super::checked_patch::CheckedPatch;
 use super::container::float_bytes;
 use super::cut::index_bytes;
+use super::error::ScanError;
 use super::hatch;
+use super::patch_appearance::{MaterialStyle, OwnTexture, PatchAppearance, StyleKind};
+use super::patch_images::{self, ImageSheet};
 use super::scan::ScanPart;
 use super::skin::Influence;
 
@@ -37,28 +41,31 @@ pub(super) struct PatchGroup<'s> {
     others: Vec<CheckedPatch<'s>>,
     /// How many vertices they have; fits an index.
     vertices: usize,
+    /// How many texels their images have.
+    texels: usize,
 }
 
 impl<'s> PatchGroup<'s> {
     /// One patch alone.
     pub fn of(first: CheckedPatch<'s>) -> Self {
-        let vertices = first.points.len();
-        let others = Vec::new();
         Self {
+            vertices: first.points.len(),
+            texels: texels(&first),
+            others: Vec::new(),
             first,
-            others,
-            vertices,
         }
     }
 
-    /// Whether the indices reach over another patch, too.
+    /// Whether the indices reach over another patch, too, and the images have room for its own.
     pub fn takes(&self, patch: &CheckedPatch<'_>) -> bool {
         u32::try_from(self.vertices + patch.points.len()).is_ok()
+            && self.texels + texels(patch) <= patch_images::MOST_TEXELS
     }
 
     /// Adds a patch of the same kind, which the group [takes](Self::takes).
     pub fn push(&mut self, patch: CheckedPatch<'s>) {
         self.vertices += patch.points.len();
+        self.texels += texels(&patch);
         self.others.push(patch);
     }
 
@@ -75,17 +82,52 @@ impl<'s> PatchGroup<'s> {
     /// The set of texture coordinates that is the hatch's: the patch's own, after those of the cloth; `None` if there is no
     /// room for it.
     pub fn hatch(&self) -> Option<usize> {
-        let look = self.look();
-        let set = match look.hatch.filter(|set| *set < look.texcoords.len()) {
-            Some(own) => own,
-            None => look.texcoords.len(),
-        };
+        let sets = self.first.patch.texcoords.len();
+        let is_continued = matches!(self.first.patch.appearance, PatchAppearance::Continued);
+        let own = self.look().hatch.filter(|set| is_continued && *set < sets);
+        let set = own.unwrap_or(sets);
         (set < hatch::MOST_SETS).then_some(set)
     }
 
+    /// The images of the patches, where they have their own.
+    pub fn images(&self) -> Option<ImageSheet<'s>> {
+        let all: Vec<&OwnTexture> = (self.patches())
+            .filter_map(|it| it.patch.appearance.own())
+            .collect();
+        (!all.is_empty()).then(|| ImageSheet::of(&all))
+    }
+
+    /// What makes a copy of the cloth's material that of the patches, whose images are appended; `number` tells styles apart.
+    ///
+    /// # Errors
+    /// `Exhausted`.
+    pub fn style(
+        &self,
+        images: Option<&ImageSheet<'s>>,
+        number: usize,
+        out: &mut Appender<'_>,
+        budget: &Budget<'_>,
+    ) -> Result<MaterialStyle<'s>, ScanError> {
+        let (number, kind) = match (&self.first.patch.appearance, images) {
+            (PatchAppearance::Own(own), Some(images)) => {
+                let textures = images.append(out, &self.name(), budget)?;
+                (number, StyleKind::Own(&own.look, textures))
+            }
+            (PatchAppearance::Flat(look, means), _) => (number, StyleKind::Flat(look, means)),
+            (PatchAppearance::Plain, _) => (number, StyleKind::Plain),
+            _ => (0, StyleKind::Continued),
+        };
+        Ok(MaterialStyle { number, kind })
+    }
+
     /// Appends the primitive, and one of the other side if the patches have one.
-    pub fn append(&self, out: &mut Appender<'_>, look: &PrimitiveLook) {
-        let front = self.front(out, look);
+    pub fn append(
+        &self,
+        out: &mut Appender<'_>,
+        look: &PrimitiveLook,
+        images: Option<&ImageSheet<'s>>,
+    ) {
+        let front = self.front(out, look, images);
         let back = (self.first.patch.both_sides).then(|| self.back(out, &front));
         for primitive in [front].into_iter().chain(back) {
             out.primitive(self.home().mesh, primitive);
@@ -105,7 +147,12 @@ impl<'s> PatchGroup<'s> {
     }
 
     /// Appends the accessors of the front; returns the primitive with them.
-    fn front(&self, out: &mut Appender<'_>, look: &PrimitiveLook) -> Value {
+    fn front(
+        &self,
+        out: &mut Appender<'_>,
+        look: &PrimitiveLook,
+        images: Option<&ImageSheet<'s>>,
+    ) -> Value {
         let mut attributes = Map::new();
         let points = self.rows(|patch| &patch.points);
         let bounds = Some(AccessorBounds::of(&points));
@@ -113,17 +160,23 @@ impl<'s> PatchGroup<'s> {
         if self.look().normals.is_some() {
             let normals: Vec<[f32; 3]> = self.patches().flat_map(CheckedPatch::normals).collect();
             attributes.insert("NORMAL".into(), self.floats(out, &normals, None));
+            let tangents = self.tangents();
+            if !tangents.is_empty() {
+                attributes.insert("TANGENT".into(), self.floats(out, &tangents, None));
+            }
         }
         let hatch = look.extensions.as_ref().and_then(|_| self.hatch());
         let own = self.first.patch.texcoords.len();
         for n in 0..own + usize::from(hatch == Some(own)) {
-            let set = match hatch {
-                Some(hatch) if hatch == n => self.hatch_coordinates(),
+            let set = match (hatch, images) {
+                (Some(hatch), _) if hatch == n => self.hatch_coordinates(),
+                (_, Some(images)) => self.image_coordinates(images),
                 _ => self.rows(|it| it.patch.texcoords.get(n).map_or(&[], Vec::as_slice)),
             };
             attributes.insert(format!("TEXCOORD_{n}"), self.floats(out, &set, None));
         }
-        for (n, kind) in self.look().color_kinds.iter().enumerate() {
+        let colors = self.first.patch.colors.len();
+        for (n, kind) in self.look().color_kinds.iter().take(colors).enumerate() {
             let set = self.rows(|it| it.patch.colors.get(n).map_or(&[], Vec::as_slice));
             let set = match kind {
                 Type::Vec3 => {
@@ -168,6 +221,22 @@ impl<'s> PatchGroup<'s> {
         Value::Object(primitive)
     }
 
+    /// The places of all patches in their common images.
+    fn image_coordinates(&self, images: &ImageSheet<'s>) -> Vec<[f32; 2]> {
+        let each = self.patches().enumerate().map(|(k, patch)| {
+            let own = patch.patch.texcoords.first();
+            let own = own.into_iter().flatten();
+            own.map(move |place| images.place(k, *place))
+        });
+        each.flatten().collect()
+    }
+
+    /// Tangents of all patches' vertices; none unless a texture needs them.
+    fn tangents(&self) -> Vec<[f32; 4]> {
+        let each = self.patches().map(|patch| patch.tangents(&patch.normals()));
+        each.flatten().collect()
+    }
+
     /// The hatch of all patches, each laid on its own.
     fn hatch_coordinates(&self) -> Vec<[f32; 2]> {
         let each = self
@@ -176,7 +245,7 @@ impl<'s> PatchGroup<'s> {
         each.flatten().collect()
     }
 
-    /// The primitive of the back: it shares all accessors of the front except normals and indices.
+    /// The primitive of the back: it shares all accessors of the front except normals, tangents and indices.
     fn back(&self, out: &mut Appender<'_>, front: &Value) -> Value {
         let mut back = front.clone();
         back["indices"] = self.indices(out, PatchSide::Back);
@@ -184,6 +253,11 @@ impl<'s> PatchGroup<'s> {
             let normals = self.patches().flat_map(CheckedPatch::normals);
             let inward: Vec<[f32; 3]> = normals.map(|n| n.map(|x| -x)).collect();
             back["attributes"]["NORMAL"] = self.floats(out, &inward, None);
+            let tangents = self.tangents().into_iter();
+            let tangents: Vec<[f32; 4]> = tangents.map(|[x, y, z, w]| [x, y, z, -w]).collect();
+            if !tangents.is_empty() {
+                back["attributes"]["TANGENT"] = self.floats(out, &tangents, None);
+            }
         }
         back
     }
@@ -284,4 +358,10 @@ impl<'s> PatchGroup<'s> {
             bounds: None,
         })
     }
+}
+
+/// Texels of a patch's own image.
+fn texels(patch: &CheckedPatch<'_>) -> usize {
+    let own = patch.patch.appearance.own();
+    own.map_or(0, |own| own.width as usize * own.height as usize)
 }

@@ -11,6 +11,7 @@ use serde_json::{Map, Value, json};
 use super::append::Appender;
 use super::error::ScanError;
 use super::hatch;
+use super::patch_appearance::{MaterialStyle, StyleKind};
 use super::patch_primitive::is_reconstructed;
 use super::scan::Scan;
 use super::variants::{MaterialChoices, PatchMaterials};
@@ -25,12 +26,32 @@ const GLOW: [f64; 3] = [0.39, 0.17, 0.0];
 /// Extensions in which a material does not glow, or as bright as it likes.
 const WITHOUT_GLOW: [&str; 2] = ["KHR_materials_unlit", "KHR_materials_emissive_strength"];
 
+/// What decides a copy of a material.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct BlendedKey {
+    source: Option<usize>,
+    /// Number of the style.
+    style: usize,
+    /// The variant, where the style depends on it.
+    variant: Option<usize>,
+}
+
+/// The materials that a patch's are made of.
+pub(super) struct MaterialRequest<'c> {
+    /// The cloth's.
+    pub choices: &'c MaterialChoices,
+    /// What makes them the patch's.
+    pub style: &'c MaterialStyle<'c>,
+    /// The set of texture coordinates of the hatch.
+    pub hatch: Option<usize>,
+}
+
 /// Makes the materials of patches, each once.
 pub(super) struct PatchMaterialsMaker<'s> {
     scan: &'s Scan,
-    blended: BTreeMap<Option<usize>, usize>,
-    /// By the material and the set of texture coordinates of the hatch.
-    marked: BTreeMap<(Option<usize>, Option<usize>), usize>,
+    blended: BTreeMap<BlendedKey, usize>,
+    /// By the set of texture coordinates of the hatch, too.
+    marked: BTreeMap<(BlendedKey, Option<usize>), usize>,
     /// The texture of the hatch, once it is appended.
     hatch: Option<usize>,
     /// The packet of metadata that they refer to.
@@ -49,25 +70,28 @@ impl<'s> PatchMaterialsMaker<'s> {
         }
     }
 
-    /// The materials of a patch beside cloth with these; `hatch` is its set of texture coordinates for the hatch.
+    /// The materials of a patch.
     ///
     /// # Errors
     /// [`ScanError::Invalid`] for a material of the scan that is missing or no object.
     pub fn make(
         &mut self,
         out: &mut Appender<'_>,
-        choices: &MaterialChoices,
-        hatch: Option<usize>,
+        request: &MaterialRequest<'_>,
     ) -> Result<PatchMaterials, ScanError> {
-        let default = self.blended(out, choices.default)?;
-        let mapped = choices.mapped.iter().map(|(variant, material)| {
-            let copy = self.blended(out, Some(*material))?;
-            Ok((*variant, copy))
-        });
-        let mapped = mapped.collect::<Result<_, ScanError>>()?;
-        let marked = match choices.marked {
+        let MaterialRequest { choices, style, .. } = request;
+        let default = self.blended(out, choices.default, style, None)?;
+        let mut mapped = BTreeMap::new();
+        for variant in choices.mapped.keys().copied().chain(style.variants()) {
+            let source = choices.mapped.get(&variant).copied().or(choices.default);
+            mapped.insert(variant, self.blended(out, source, style, Some(variant))?);
+        }
+        let known = choices
+            .marked
+            .filter(|_| matches!(style.kind, StyleKind::Continued));
+        let marked = match known {
             Some(marked) => marked,
-            None => self.marked(out, choices.default, hatch)?,
+            None => self.marked(out, request)?,
         };
         Ok(PatchMaterials {
             default,
@@ -76,39 +100,55 @@ impl<'s> PatchMaterialsMaker<'s> {
         })
     }
 
-    /// A copy of a material that looks like it. A material that is a patch's already is used as it is.
+    /// A copy of a material that looks like it. A material that is a patch's already is used as it is, where the style
+    /// changes nothing.
     pub fn blended(
         &mut self,
         out: &mut Appender<'_>,
         source: Option<usize>,
+        style: &MaterialStyle<'_>,
+        variant: Option<usize>,
     ) -> Result<usize, ScanError> {
-        if let Some(known) = self.blended.get(&source) {
+        let is_continued = matches!(style.kind, StyleKind::Continued);
+        let key = BlendedKey {
+            source,
+            style: style.number,
+            variant: variant.filter(|_| !is_continued),
+        };
+        if let Some(known) = self.blended.get(&key) {
             return Ok(*known);
         }
         let mut copy = self.source(source)?;
         let own = is_reconstructed(copy.get("extras"));
-        let made = match (source, own) {
+        let made = match (source, own && is_continued) {
             (Some(source), true) => source,
             _ => {
+                style.apply(&mut copy, variant);
                 mark(&mut copy, RECONSTRUCTION, &["reconstructed"]);
                 self.refer(&mut copy);
                 out.push("materials", Value::Object(copy))
             }
         };
-        self.blended.insert(source, made);
+        self.blended.insert(key, made);
         Ok(made)
     }
 
     fn marked(
         &mut self,
         out: &mut Appender<'_>,
-        source: Option<usize>,
-        hatch: Option<usize>,
+        request: &MaterialRequest<'_>,
     ) -> Result<usize, ScanError> {
-        if let Some(known) = self.marked.get(&(source, hatch)) {
+        let (source, hatch) = (request.choices.default, request.hatch);
+        let key = BlendedKey {
+            source,
+            style: request.style.number,
+            variant: None,
+        };
+        if let Some(known) = self.marked.get(&(key, hatch)) {
             return Ok(*known);
         }
         let mut copy = self.source(source)?;
+        request.style.apply(&mut copy, None);
         let name = format!("{RECONSTRUCTION}, marked");
         mark(&mut copy, &name, &["reconstructed", "marked"]);
         if let Some(extensions) = object(&mut copy, "extensions") {
@@ -141,7 +181,7 @@ impl<'s> PatchMaterialsMaker<'s> {
         }
         self.refer(&mut copy);
         let made = out.push("materials", Value::Object(copy));
-        self.marked.insert((source, hatch), made);
+        self.marked.insert((key, hatch), made);
         Ok(made)
     }
 
@@ -184,8 +224,9 @@ impl<'s> PatchMaterialsMaker<'s> {
 /// Names a material after what it is, and sets flags in `extras.darn`. Extras that are not an object cannot take them; the
 /// primitive's extras have the first one, too.
 fn mark(material: &mut Map<String, Value>, what: &str, flags: &[&str]) {
+    let of_patch = format!(" ({RECONSTRUCTION})");
     let name = match material.get("name").and_then(Value::as_str) {
-        Some(name) => format!("{name} ({what})"),
+        Some(name) => format!("{} ({what})", name.strip_suffix(&of_patch).unwrap_or(name)),
         None => what.into(),
     };
     material.insert("name".into(), name.into());

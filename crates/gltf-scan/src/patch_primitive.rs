@@ -3,10 +3,12 @@
 use darn_geometry::mesh::Vec3;
 use serde_json::{Map, Value};
 
+use super::patch_appearance::PatchAppearance;
+
 /// A patch to append to the scan. Patches of the same mesh, material and attributes share a primitive.
 ///
-/// Its attributes are those of the part whose material it takes: normals if that part has them, and as many texture
-/// coordinate and colour sets, each `[points.len()]`. On a skinned mesh its joints and weights come from the scan's
+/// Its attributes are those of the part whose material it takes: normals if that part has them, and, unless its appearance says
+/// otherwise, as many texture coordinate and colour sets, each `[points.len()]`. On a skinned mesh its joints and weights come from the scan's
 /// vertices among its points.
 #[derive(Debug, Clone)]
 pub struct PatchPrimitive {
@@ -27,6 +29,8 @@ pub struct PatchPrimitive {
     pub texcoords: Vec<Vec<[f32; 2]>>,
     /// Colour sets, linear RGBA.
     pub colors: Vec<Vec<[f32; 4]>>,
+    /// How it looks.
+    pub appearance: PatchAppearance,
     /// Name of the new accessors and buffer views, if it has a primitive of its own.
     pub name: String,
     /// What is recorded about the patch alone: its entry of `holes` in `extras.darn` of its primitive.

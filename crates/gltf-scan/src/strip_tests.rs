@@ -38,6 +38,7 @@ fn patch(scan: &Scan, part: usize, id: u32) -> PatchPrimitive {
         colors: vec![vec![[0.5; 4]; 3]; look.colors.len()],
         faces: vec![[0, 1, 2]],
         both_sides: id % 2 == 1,
+        appearance: Default::default(),
         hole: [("id".to_owned(), json!(id))].into_iter().collect(),
         method: Default::default(),
     }

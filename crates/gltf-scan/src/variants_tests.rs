@@ -33,6 +33,7 @@ fn patch(scan: &Scan, part: usize) -> PatchPrimitive {
         colors: vec![vec![[0.5; 4]; 3]; look.colors.len()],
         faces: vec![[0, 1, 2]],
         both_sides: false,
+        appearance: Default::default(),
         hole: Default::default(),
         method: Default::default(),
     }

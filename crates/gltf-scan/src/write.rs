@@ -1,17 +1,20 @@
 //! Writing: checks patches and appends them to the meshes they mend, one primitive for each mesh and material.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use darn_budget::Budget;
 
 use super::append::Appender;
 use super::checked_patch::CheckedPatch;
+use super::cloth_look::ClothLook;
 use super::cut::cut_primitives;
 use super::digests::FileDigests;
 use super::error::ScanError;
 use super::files::Companions;
+use super::patch_appearance::PatchAppearance;
 use super::patch_group::{PatchGroup, PrimitiveLook};
-use super::patch_materials::PatchMaterialsMaker;
+use super::patch_materials::{MaterialRequest, PatchMaterialsMaker};
 use super::patch_primitive::PatchPrimitive;
 use super::scan::Scan;
 use super::variants::{MaterialChoices, Variants};
@@ -69,24 +72,30 @@ impl Scan {
             holes => xmp::append_packet(self, &mut out, holes),
         };
         let mut materials = PatchMaterialsMaker::new(self, packet);
-        for group in self.groups(patches, variants.as_ref())? {
+        for (number, group) in (1..).zip(self.groups(patches, variants.as_ref())?) {
             budget.hold(TARGET * group.home().targets)?;
             budget.spend(TARGET_WORK * group.home().targets as u64)?;
+            let images = group.images();
+            let style = group.style(images.as_ref(), number, &mut out, budget)?;
             let look = match &variants {
                 Some(variants) => {
-                    let choices = variants.choices(self, group.look());
-                    let made = materials.make(&mut out, &choices, group.hatch())?;
+                    let request = MaterialRequest {
+                        choices: &variants.choices(self, group.look()),
+                        style: &style,
+                        hatch: group.hatch(),
+                    };
+                    let made = materials.make(&mut out, &request)?;
                     PrimitiveLook {
                         material: made.default,
                         extensions: Some(variants.mappings(&made, budget)?),
                     }
                 }
                 None => PrimitiveLook {
-                    material: materials.blended(&mut out, group.look().material)?,
+                    material: materials.blended(&mut out, group.look().material, &style, None)?,
                     extensions: None,
                 },
             };
-            group.append(&mut out, &look);
+            group.append(&mut out, &look, images.as_ref());
         }
         if let (Some(variants), false) = (&variants, patches.is_empty()) {
             variants.append(&mut out);
@@ -118,6 +127,7 @@ impl Scan {
         // Numbers of materials, of which a primitive may have many: by themselves, and by the primitives that have them.
         let mut same: BTreeMap<MaterialChoices, usize> = BTreeMap::new();
         let mut of_primitive: BTreeMap<(usize, usize), usize> = BTreeMap::new();
+        let mut looks: Vec<&Arc<ClothLook>> = Vec::new();
         for (index, patch) in patches.iter().enumerate() {
             let checked = CheckedPatch::new(self, patch, index)?;
             let look = checked.look;
@@ -131,7 +141,14 @@ impl Scan {
                     let next = same.len();
                     *same.entry(choices).or_insert(next)
                 });
-            let kind = checked.kind(*materials);
+            // Flat patches have colours of their own each.
+            let appearance = match &patch.appearance {
+                PatchAppearance::Continued => 0,
+                PatchAppearance::Plain => 1,
+                PatchAppearance::Own(own) => 2 + 2 * number_of(&mut looks, &own.look),
+                PatchAppearance::Flat(..) => 3 + 2 * index,
+            };
+            let kind = checked.kind(*materials, appearance);
             let known = *group_of.entry(kind.clone()).or_insert(groups.len());
             match groups.get_mut(known) {
                 Some(group) if group.takes(&checked) => group.push(checked),
@@ -143,6 +160,15 @@ impl Scan {
         }
         Ok(groups)
     }
+}
+
+/// The place of a look in a list, to which it is added if it is new.
+fn number_of<'s>(looks: &mut Vec<&'s Arc<ClothLook>>, look: &'s Arc<ClothLook>) -> usize {
+    let is_same = |known: &&Arc<ClothLook>| Arc::ptr_eq(known, look) || **known == *look;
+    looks.iter().position(is_same).unwrap_or_else(|| {
+        looks.push(look);
+        looks.len() - 1
+    })
 }
 
 /// Bytes of memory of a morph target of a patch, as JSON and as text.

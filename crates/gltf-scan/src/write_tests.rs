@@ -30,6 +30,7 @@ fn tent(scan: &Scan, part: usize, top: Vec3) -> PatchPrimitive {
         points: rim.chain([PatchPoint::New(top)]).collect(),
         faces: vec![[0, 1, 3], [1, 2, 3], [2, 0, 3]],
         both_sides: false,
+        appearance: Default::default(),
         normals: vec![Vec3::new(0.0, 0.0, 3.0); 4],
         texcoords: vec![vec![[0.25, 0.5]; 4]; look.texcoords.len()],
         colors: vec![vec![[0.1, 0.2, 0.3, 0.4]; 4]; look.colors.len()],

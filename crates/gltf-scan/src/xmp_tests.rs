@@ -25,6 +25,7 @@ fn mended(bytes: &[u8]) -> (Vec<u8>, Value) {
         colors: Vec::new(),
         faces: vec![[0, 1, 2]],
         both_sides: false,
+        appearance: Default::default(),
         hole: Default::default(),
         method: Default::default(),
     };

@@ -9,12 +9,12 @@ use crate::hole_report::FilledHole;
 use crate::near_seams::{RegionSources, meet_both_sides};
 use crate::welded_scan::{SourceFace, WeldedScan};
 use darn_contract::v1;
-use darn_geometry::mesh::Vec3;
 use darn_geometry::mesh::curvature::vertex_normals;
 use darn_geometry::mesh::region::Region;
-use darn_geometry::patch::attributes::{Columns, extend_attributes};
+use darn_geometry::mesh::{Vec2, Vec3};
+use darn_geometry::patch::attributes::{AttributedPatch, Columns, Corner, extend_attributes};
 use darn_geometry::patch::{Patch, quality};
-use darn_gltf_scan::{PatchPoint, PatchPrimitive, Scan, ScanPart};
+use darn_gltf_scan::{PatchAppearance, PatchPoint, PatchPrimitive, Scan, ScanPart};
 use darn_net::WeightsCard;
 
 /// Stands for a vertex of a region that the scan does not have: the new hem's.
@@ -32,12 +32,30 @@ pub struct PatchSource<'a> {
     pub budget: &'a Budget<'a>,
 }
 
+/// A patch with the scan's attributes continued, and what it takes to give it others.
+pub struct DressedPatch<'a> {
+    /// As a primitive of the part that most of its rim belongs to.
+    pub primitive: PatchPrimitive,
+    /// Per point of the primitive its vertex of the patch; one on a texture seam has several.
+    pub vertex_of: Vec<u32>,
+    /// Per face of the region the scan's face that it was made of.
+    pub sources: Vec<Option<SourceFace>>,
+    /// Per vertex of the region a vertex of the scan at the same point.
+    pub any: Vec<u32>,
+    /// Per vertex of the patch its normal in scene space.
+    pub normals: Vec<Vec3>,
+    /// Per vertex of the patch its place in the chart; empty without one.
+    pub patch_flat: &'a [Vec2],
+    /// The patch's triangles.
+    pub patch_faces: &'a [[u32; 3]],
+}
+
 impl PatchSource<'_> {
     /// The patch of a filled hole as a primitive of the part that most of its rim belongs to.
     ///
     /// # Errors
     /// `Exhausted`.
-    pub fn addition(&self, filled: &FilledHole) -> Result<PatchPrimitive, Exhausted> {
+    pub fn dressed<'f>(&self, filled: &'f FilledHole) -> Result<DressedPatch<'f>, Exhausted> {
         let PatchSource {
             scan,
             welded,
@@ -114,10 +132,7 @@ impl PatchSource<'_> {
             meet_both_sides(&mut dressed, patch, around, scan);
         }
         budget.hold(patch_bytes(dressed.corners.len(), width))?;
-        let points = dressed.corners.iter().map(|c| match c.scan {
-            Some(s) if s != NO_VERTEX => PatchPoint::Scan(s),
-            _ => PatchPoint::New(patch.positions[c.vertex as usize]),
-        });
+        let points = dressed.corners.iter().map(|corner| point(corner, patch));
         let column = |c: usize| {
             dressed
                 .corners
@@ -142,12 +157,13 @@ impl PatchSource<'_> {
                 .map(|n| [0, 1, 2, 3].map(|k: usize| rgba[k][n]))
                 .collect()
         });
-        Ok(PatchPrimitive {
+        let primitive = PatchPrimitive {
             part,
             material_of: part,
             points: points.collect(),
             faces: dressed.faces,
             both_sides: is_backed(region, welded) || welded.has_back(report.id),
+            appearance: PatchAppearance::Continued,
             normals: dressed
                 .corners
                 .iter()
@@ -158,7 +174,64 @@ impl PatchSource<'_> {
             name: format!("darn reconstruction of hole {}", report.id),
             hole: hole_record(report),
             method: method_record(report, card),
+        };
+        Ok(DressedPatch {
+            primitive,
+            vertex_of: dressed.corners.iter().map(|c| c.vertex).collect(),
+            sources,
+            any,
+            normals,
+            patch_flat: &patch.flat,
+            patch_faces: &patch.faces,
         })
+    }
+
+    /// A dressed patch as it is without the scan's attributes, not cut along its texture seams, with columns of its own per vertex:
+    /// the primitive, without texture coordinates and colours, and per point its columns.
+    pub fn undivided(
+        &self,
+        filled: &FilledHole,
+        dressed: &DressedPatch,
+        columns: &[Vec<f64>],
+    ) -> (PatchPrimitive, Vec<Vec<f64>>) {
+        let (patch, region) = (&filled.patch, filled.hole.region());
+        let corner = |(vertex, values): (usize, &Vec<f64>)| Corner {
+            vertex: vertex as u32,
+            scan: (patch.rim.get(vertex)).map(|v| dressed.any[*v as usize]),
+            values: values.clone(),
+        };
+        let mut whole = AttributedPatch {
+            corners: columns.iter().enumerate().map(corner).collect(),
+            faces: patch.faces.clone(),
+        };
+        if self.welded.surface.set_aside.near_seam_vertices > 0 {
+            let around = RegionSources {
+                region,
+                sources: &dressed.sources,
+            };
+            meet_both_sides(&mut whole, patch, around, self.scan);
+        }
+        let corners = || whole.corners.iter();
+        let primitive = PatchPrimitive {
+            points: corners().map(|corner| point(corner, patch)).collect(),
+            normals: corners()
+                .map(|corner| dressed.normals[corner.vertex as usize])
+                .collect(),
+            texcoords: Vec::new(),
+            colors: Vec::new(),
+            faces: whole.faces.clone(),
+            ..dressed.primitive.clone()
+        };
+        let columns = whole.corners.into_iter().map(|corner| corner.values);
+        (primitive, columns.collect())
+    }
+}
+
+/// A corner of a patch as a point of its primitive.
+fn point(corner: &Corner, patch: &Patch) -> PatchPoint {
+    match corner.scan {
+        Some(s) if s != NO_VERTEX => PatchPoint::Scan(s),
+        _ => PatchPoint::New(patch.positions[corner.vertex as usize]),
     }
 }
 

@@ -8,6 +8,7 @@ use crate::error::MendError;
 use crate::inpainter::{FillKey, Inpainter};
 use crate::mender::Call;
 use crate::network_share::WidenedHole;
+use crate::texture::HoleTextures;
 use crate::timings::milliseconds;
 use darn_contract::v1;
 use darn_geometry::flatten::Chart;
@@ -61,6 +62,8 @@ pub struct Hole {
     pub base: Option<Vec<[f32; 3]>>,
     /// The unedited cloths made so far.
     pub unedited: UneditedCloths,
+    /// The textures of its patch made so far.
+    pub textures: HoleTextures,
 }
 
 /// A hole's unedited cloths, by what decides them; the oldest is dropped first.
@@ -214,7 +217,7 @@ impl Hole {
             + 16 * self.chart.flat.len();
         // Position, known flag, entry in the hole's cells, base.
         let grid = CELLS * (24 + 1 + 9 + 12);
-        region + grid + self.plan.bytes() + self.unedited.bytes()
+        region + grid + self.plan.bytes() + self.unedited.bytes() + self.textures.bytes()
     }
 }
 

@@ -77,6 +77,8 @@ impl<'a> PatchDraft<'a> {
                 network_share: f64::from(network_share),
                 ..patch_report(hole, &patch, &quality)
             }),
+            // Written with the scan.
+            texture: None,
             timings: Some(timings),
             notes,
             anchors: kept.anchors,

@@ -6,7 +6,7 @@
 //! `prepare` lays the cloth around a hole flat and makes a `hole` of it (a `prepared_hole` is this, or a `fair_hole` where
 //! the cloth cannot be laid flat), `constraints` places anchors and gestures on
 //! it, `moved_fill` asks the network for cloth that moved, `fill_hole` meshes it, `separate` pushes neighbouring
-//! patches apart, `hole_report` measures the patch, and `addition` writes it in glTF terms. `scan_holes` runs these
+//! patches apart, `hole_report` measures the patch, `addition` writes it in glTF terms, and `texture` gives it its colour. `scan_holes` runs these
 //! stages for all holes of a scan; [`mend`] drops it, a [`ScanSession`] keeps it. `edit` holds the gestures and the
 //! anchor search. [`strip`] undoes mends. [`SharedMender`] is the port's [`Mender`](darn_contract::port::Mender).
 //!
@@ -55,6 +55,8 @@ mod strip;
 mod suspects;
 #[cfg(test)]
 mod testing;
+mod texture;
+mod texture_cloth;
 mod timings;
 mod welded_scan;
 mod without_noise;
@@ -100,7 +102,7 @@ pub fn mend<'a>(
         || scan.digests(),
     );
     let holes = holes?;
-    holes.mended(scan, holes.filled(call)?, call)
+    holes.mended(scan, holes.filled(call)?, constraints.texture, call)
 }
 
 /// Searches where on a hole's grid a point in space belongs: the cell where an anchor at that point brings the cloth
@@ -130,7 +132,7 @@ pub fn mend_to_target<'a>(
     let holes = ScanHoles::open(scan, &Constraints::default(), call)?;
     let found = holes.search(search, call)?;
     let filled = holes.filled_with(scan, &anchor_of(&found, search), call)?;
-    holes.mended(scan, filled, call)
+    holes.mended(scan, filled, None, call)
 }
 
 /// The result of a search as constraints: one soft anchor at the search's target.

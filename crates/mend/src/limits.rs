@@ -2,6 +2,7 @@
 
 use darn_geometry::flatten::FlattenLimits;
 use darn_geometry::patch::PatchOptions;
+use darn_texture::Settings as TextureSettings;
 
 use crate::edit::SearchOptions;
 
@@ -21,6 +22,8 @@ pub struct MendLimits {
     /// Most holes of one request. All their charts, grids and patches are in memory together, about 0.7 MB each: the budget's
     /// memory ends larger requests earlier.
     pub holes: usize,
+    /// Limits of the images of a patch's own.
+    pub texture: TextureSettings,
 }
 
 impl Default for MendLimits {
@@ -32,6 +35,7 @@ impl Default for MendLimits {
             search: SearchOptions::default(),
             seeds: 16,
             holes: 10_000,
+            texture: TextureSettings::default(),
         }
     }
 }

@@ -386,6 +386,7 @@ impl Preparation<'_> {
             islands,
             rim_uv,
             unedited: UneditedCloths::default(),
+            textures: Default::default(),
             region,
             chart,
         })

@@ -2,9 +2,11 @@
 
 use darn_budget::{Budget, Exhausted};
 
+use crate::doubts::doubts;
 use crate::error::MendError;
 use crate::fair_hole::FairHole;
 use crate::hole::Hole;
+use crate::inpainter::Inpainter;
 use crate::mender::Call;
 use crate::prepare::prepare_hole;
 use crate::welded_scan::WeldedScan;
@@ -52,6 +54,40 @@ impl PreparedHole {
             Ok(hole) => Ok(boxed(hole)),
             Err(MendError::Exhausted(exhausted)) => Err(exhausted.into()),
             Err(_) => Err(error),
+        }
+    }
+
+    /// The hole with a fair surface instead, where its patch on the chart is no plausible cloth and the fair surface is.
+    ///
+    /// # Errors
+    /// A failure of the network; `Exhausted`.
+    pub fn or_fair(
+        self,
+        welded: &WeldedScan,
+        inpainter: &Inpainter,
+        call: Call,
+    ) -> Result<PreparedHole, MendError> {
+        let PreparedHole::Charted(hole) = &self else {
+            return Ok(self);
+        };
+        let doubts = match hole.unedited(inpainter, call) {
+            Ok(unedited) => doubts(&unedited.patch),
+            Err(MendError::Patch { source, .. }) => vec![source.to_string()],
+            Err(error) => return Err(error),
+        };
+        if doubts.is_empty() {
+            return Ok(self);
+        }
+        let reason = format!(
+            "laid in its chart, its patch is no plausible cloth: {}",
+            doubts.join("; ")
+        );
+        match FairHole::new(welded, hole.id, reason, call) {
+            Ok(fair) if crate::doubts::doubts(&fair.fair.patch).is_empty() => {
+                Ok(PreparedHole::Fair(Box::new(fair)))
+            }
+            Err(MendError::Exhausted(exhausted)) => Err(exhausted.into()),
+            _ => Ok(self),
         }
     }
 

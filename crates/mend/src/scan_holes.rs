@@ -20,11 +20,12 @@ use crate::prepared_hole::PreparedHole;
 use crate::scan_notes;
 use crate::select::{HoleRequest, Selection, skipped_for};
 use crate::separate::separate;
+use crate::texture::{ColouredPatch, Colouring};
 use crate::timings::milliseconds;
 use crate::welded_scan::WeldedScan;
 use darn_budget::Budget;
 use darn_contract::port::Mended;
-use darn_contract::{Constraints, FieldError, HoleSelector, Search, v1};
+use darn_contract::{Constraints, FieldError, HoleSelector, Search, TextureChoice, v1};
 use darn_gltf_scan::{PatchPrimitive, Scan};
 
 /// A scan's holes, prepared.
@@ -101,6 +102,8 @@ impl ScanHoles {
     ) -> Result<ScanHoles, MendError> {
         let constraints = Constraints {
             holes: search.hole.map(HoleSelector::Id).into_iter().collect(),
+            // A search needs the hole's chart, however its patch comes out.
+            accept_doubtful: true,
             ..Constraints::default()
         };
         let welded = WeldedScan::of(scan, call.budget)?;
@@ -128,11 +131,15 @@ impl ScanHoles {
         }
         // Weights that are not loaded are refused before the holes are prepared.
         let weights = constraints.weights.as_deref();
-        Inpainter::choose(&call.mender.networks, weights, constraints.up)?;
+        let inpainter = Inpainter::choose(&call.mender.networks, weights, constraints.up)?;
         let started = Instant::now();
         let prepare = |request: &HoleRequest| {
             call.budget.check()?;
-            PreparedHole::new(&welded, request.id, call)
+            let hole = PreparedHole::new(&welded, request.id, call)?;
+            match selection.accept_doubtful || request.is_edited() {
+                true => Ok(hole),
+                false => hole.or_fair(&welded, &inpainter, call),
+            }
         };
         let holes: Vec<Result<PreparedHole, MendError>> =
             selection.requests.par_iter().map(prepare).collect();
@@ -235,22 +242,58 @@ impl ScanHoles {
         })
     }
 
-    /// The scan with the patches of the filled holes, and the report.
+    /// The scan with the patches of the filled holes, coloured as asked for, and the report.
     ///
     /// # Errors
-    /// When the patches cannot be written.
-    pub fn mended(&self, scan: &Scan, filled: FilledScan, call: Call) -> Result<Mended, MendError> {
+    /// When the patches cannot be written; `Exhausted`.
+    pub fn mended(
+        &self,
+        scan: &Scan,
+        mut filled: FilledScan,
+        texture: Option<TextureChoice>,
+        call: Call,
+    ) -> Result<Mended, MendError> {
         let started = Instant::now();
-        let additions = self.additions(scan, &filled, call.budget)?;
-        let additions_ms = milliseconds(started);
+        let source = self.patch_source(scan, &filled, call.budget);
+        let dressed = (filled.holes.par_iter())
+            .map(|hole| Ok(source.dressed(hole)?))
+            .collect::<Result<Vec<_>, MendError>>()?;
+        let dressed_ms = milliseconds(started);
         let started = Instant::now();
+        let colouring = Colouring {
+            source,
+            choice: texture,
+            settings: call.mender.limits.texture,
+            scan_limits: &call.mender.scan_limits,
+        };
+        let coloured = colouring.coloured(&filled.holes, dressed)?;
+        let texture_ms = milliseconds(started);
+        let started = Instant::now();
+        let mut additions = Vec::with_capacity(coloured.len());
+        let mut told = Vec::with_capacity(coloured.len());
+        for ColouredPatch {
+            primitive,
+            report,
+            texture_ms,
+        } in coloured
+        {
+            additions.push(primitive);
+            told.push((report, texture_ms));
+        }
+        for (hole, (report, texture_ms)) in filled.holes.iter_mut().zip(told) {
+            hole.report.texture = Some(report);
+            if let Some(timings) = &mut hole.report.timings {
+                timings.texture = texture_ms;
+            }
+        }
         let written = self.seen(scan).write_within(&additions, call.budget)?;
         let mut report = self.report(scan, filled);
         report.input = Some(digests::message(scan.digests().clone()));
         report.output = Some(digests::message(written.digests));
         if let Some(timings) = &mut report.timings {
+            timings.texture = texture_ms;
             timings.write = milliseconds(started);
-            timings.total += additions_ms + timings.write;
+            timings.total += dressed_ms + texture_ms + timings.write;
         }
         Ok(Mended {
             bytes: written.bytes,
@@ -259,25 +302,34 @@ impl ScanHoles {
         })
     }
 
-    /// The patches in the scan's terms.
+    /// The patches in the scan's terms, with its texture coordinates and colours continued.
     ///
     /// # Errors
     /// `Exhausted`.
-    pub fn additions(
+    pub fn continued(
         &self,
         scan: &Scan,
         filled: &FilledScan,
         budget: &Budget,
     ) -> Result<Vec<PatchPrimitive>, MendError> {
-        let source = PatchSource {
+        let source = self.patch_source(scan, filled, budget);
+        let each = filled.holes.par_iter();
+        let all = each.map(|hole| Ok(source.dressed(hole)?.primitive));
+        all.collect()
+    }
+
+    fn patch_source<'a>(
+        &'a self,
+        scan: &'a Scan,
+        filled: &'a FilledScan<'a>,
+        budget: &'a Budget<'a>,
+    ) -> PatchSource<'a> {
+        PatchSource {
             scan: self.seen(scan),
             welded: &self.welded,
             card: filled.inpainter.card(),
             budget,
-        };
-        let each = filled.holes.par_iter();
-        let all = each.map(|hole| Ok(source.addition(hole)?));
-        all.collect()
+        }
     }
 
     /// The report of the whole scan.

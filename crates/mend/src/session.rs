@@ -130,10 +130,12 @@ impl<'a> SessionCall<'a> {
     /// As [`mend`](crate::mend).
     pub fn mended(&self, constraints: &Constraints) -> Result<Mended, MendError> {
         let filled = self.filled(constraints)?;
-        let mut mended = self
-            .session
-            .holes
-            .mended(&self.session.scan, filled, self.call)?;
+        let mut mended = self.session.holes.mended(
+            &self.session.scan,
+            filled,
+            constraints.texture,
+            self.call,
+        )?;
         self.session.remove_preparation(&mut mended.report);
         Ok(mended)
     }
@@ -145,7 +147,7 @@ impl<'a> SessionCall<'a> {
     pub fn glb(&self, constraints: &Constraints) -> Result<(Vec<u8>, v1::Report), MendError> {
         let filled = self.filled(constraints)?;
         let additions =
-            (self.session.holes).additions(&self.session.scan, &filled, self.call.budget)?;
+            (self.session.holes).continued(&self.session.scan, &filled, self.call.budget)?;
         let bytes = glb(&self.session.scan, &additions)?;
         Ok((bytes, self.session.report(filled)))
     }

@@ -30,18 +30,44 @@ const BAND: usize = 32;
 /// Faces with indices out of range or positions that are not finite are left out. The same input gives the same
 /// picture, with any number of threads.
 pub fn picture(mesh: &TriMesh, tints: &[[u8; 3]], options: &PictureOptions) -> RgbImage {
+    let linear: Vec<[f32; 3]> = tints.iter().map(|tint| shade::from_srgb(*tint)).collect();
+    let cloth = shade::from_srgb(CLOTH);
+    let paint = |place: &FacePlace| linear.get(place.face).copied().unwrap_or(cloth);
+    painted(mesh, &paint, options)
+}
+
+/// A point of a mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FacePlace {
+    /// Index of the face.
+    pub face: usize,
+    /// Barycentric coordinates of the point at the face's corners.
+    pub weights: [f64; 3],
+}
+
+/// Draws `mesh` as [`picture`] does, with a base colour of its own at each point: linear red, green, blue from 0 to 1.
+pub fn painted(
+    mesh: &TriMesh,
+    paint: &(dyn Fn(&FacePlace) -> [f32; 3] + Sync),
+    options: &PictureOptions,
+) -> RgbImage {
     let [width, height] = options.size.map(|side| side.clamp(1, MAX_SIDE) as usize);
     let size = PixelSize { width, height };
     let faces = drawable_faces(mesh);
     let camera = Camera::new(mesh, &faces, options, size);
-    let triangles = raster::triangles(mesh, &faces, tints, &camera);
+    let triangles = raster::triangles(mesh, &faces, &camera);
     let segments = outline::segments(mesh, &faces, options.lines, &camera);
 
     let bands: Vec<raster::RowBand> = (0..height.div_ceil(BAND))
         .into_par_iter()
         .map(|band| {
             let rows = band * BAND..((band + 1) * BAND).min(height);
-            raster::draw(&triangles, &segments, size, rows)
+            let scene = raster::Scene {
+                triangles: &triangles,
+                segments: &segments,
+                paint,
+            };
+            raster::draw(&scene, size, rows)
         })
         .collect();
     let pixels = raster::Pixels::joined(bands, size);
@@ -110,6 +136,21 @@ mod tests {
         let mesh = sheet(8, 4);
         let drawn = picture(&mesh, &vec![MENDED; mesh.faces.len()], &small());
         assert!(warmth(drawn.get_pixel(40, 30)).abs() < 30);
+    }
+
+    #[test]
+    fn paint_is_asked_for_every_point_of_a_face() {
+        let mesh = sheet(1, 0);
+        // The second face is red towards its last corner and blue elsewhere.
+        let paint = |place: &FacePlace| match place.face == 1 && place.weights[2] > 0.5 {
+            true => [0.9, 0.0, 0.0],
+            false => [0.0, 0.0, 0.9],
+        };
+        let drawn = painted(&mesh, &paint, &small());
+        let red = drawn.pixels().filter(|p| warmth(p) > 60).count();
+        let blue = drawn.pixels().filter(|p| warmth(p) < -60).count();
+        // A quarter of one of two faces.
+        assert!(5 * red < blue && blue < 9 * red, "{red} {blue}");
     }
 
     #[test]

@@ -1,10 +1,11 @@
 //! The z-buffer: draws triangles and lines with 3 × 3 samples a pixel, one band of rows at a time.
 
+use super::FacePlace;
 use super::camera::Camera;
 use super::face::DrawableFace;
 use super::options::PixelSize;
 use super::outline::Segment;
-use super::shade::{self, CLOTH, FaceSide, LinearRgb};
+use super::shade::{self, FaceSide, LinearRgb};
 use darn_geometry::mesh::{TriMesh, Vec3};
 use std::ops::Range;
 
@@ -21,14 +22,22 @@ pub(super) struct ScreenTriangle {
     /// Unit vectors from the corners to the eye, camera axes.
     to_eye: [Vec3; 3],
     side: FaceSide,
-    base: LinearRgb,
+    /// Index in the mesh.
+    face: usize,
+}
+
+/// What is drawn.
+pub(super) struct Scene<'s> {
+    pub triangles: &'s [ScreenTriangle],
+    pub segments: &'s [Segment],
+    /// The base colour of every point.
+    pub paint: &'s (dyn Fn(&FacePlace) -> LinearRgb + Sync),
 }
 
 /// All faces as the camera sees them, except those with a corner too near.
 pub(super) fn triangles(
     mesh: &TriMesh,
     faces: &[DrawableFace],
-    tints: &[[u8; 3]],
     camera: &Camera,
 ) -> Vec<ScreenTriangle> {
     let normals = shade::vertex_normals(mesh, faces);
@@ -50,7 +59,7 @@ pub(super) fn triangles(
             normals: face.vertices.map(|v| smooth(v) * facing),
             to_eye: seen.map(|p| shade::unit(-p)),
             side,
-            base: shade::from_srgb(tints.get(face.face).copied().unwrap_or(CLOTH)),
+            face: face.face,
         })
     };
     faces.iter().filter_map(shown).collect()
@@ -95,20 +104,22 @@ impl Pixels {
 }
 
 /// Draws some rows of a picture of `size`.
-pub(super) fn draw(
-    triangles: &[ScreenTriangle],
-    segments: &[Segment],
-    size: PixelSize,
-    rows: Range<usize>,
-) -> RowBand {
+pub(super) fn draw(scene: &Scene<'_>, size: PixelSize, rows: Range<usize>) -> RowBand {
     let mut canvas = Canvas::new(size, rows);
-    for triangle in triangles {
-        canvas.fill(triangle);
+    for triangle in scene.triangles {
+        canvas.fill(triangle, scene);
     }
-    for segment in segments {
+    for segment in scene.segments {
         canvas.stroke(segment);
     }
     canvas.resolved()
+}
+
+/// A place of a triangle and its base colour.
+struct Sample<'t> {
+    t: &'t ScreenTriangle,
+    place: FacePlace,
+    base: LinearRgb,
 }
 
 /// The samples of a band.
@@ -152,7 +163,7 @@ impl Canvas {
     }
 
     /// Draws a triangle.
-    fn fill(&mut self, t: &ScreenTriangle) {
+    fn fill(&mut self, t: &ScreenTriangle, scene: &Scene<'_>) {
         let [a, b, c] = t.corners.map(|p| [p.x, p.y]);
         let doubled = cross(a, b, c);
         if doubled == 0.0 || !doubled.is_finite() {
@@ -178,20 +189,27 @@ impl Canvas {
                 let at = (y - self.rows.start) * self.width + x;
                 let nearest = self.depth.get(at).copied().unwrap_or(f32::NEG_INFINITY);
                 if (depth as f32) < nearest {
-                    self.put(at, t, weight.map(|w| w * depth), depth as f32);
+                    let place = FacePlace {
+                        face: t.face,
+                        weights: weight.map(|w| w * depth),
+                    };
+                    let base = (scene.paint)(&place);
+                    self.put(at, depth as f32, &Sample { t, place, base });
                 }
             }
         }
     }
 
-    /// Shades one sample; `weight` are barycentric coordinates on the triangle.
-    fn put(&mut self, at: usize, t: &ScreenTriangle, weight: [f64; 3], depth: f32) {
+    /// Shades one sample.
+    fn put(&mut self, at: usize, depth: f32, sample: &Sample<'_>) {
+        let Sample { t, place, base } = *sample;
+        let weight = place.weights;
         let blended = |v: &[Vec3; 3]| {
             let sum = shade::unit(v[0] * weight[0] + v[1] * weight[1] + v[2] * weight[2]);
             [sum.x as f32, sum.y as f32, sum.z as f32]
         };
         let normal = blended(&t.normals);
-        let light = shade::lit(t.base, normal, blended(&t.to_eye), t.side);
+        let light = shade::lit(base, normal, blended(&t.to_eye), t.side);
         if let (Some(c), Some(d), Some(n)) = (
             self.colour.get_mut(at),
             self.depth.get_mut(at),

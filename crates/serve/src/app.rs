@@ -36,8 +36,8 @@ use darn_contract::port::{Mender, Refusal};
 const WORK_PER_BYTE: u64 = 40_000;
 /// Bytes of memory that a request may hold for each byte of its scan.
 const MEMORY_PER_BYTE: usize = 150;
-/// Bytes of memory that any request may hold.
-const LEAST_MEMORY: usize = 64 << 20;
+/// Bytes of memory that any request may hold: a small scan may have large images.
+const LEAST_MEMORY: usize = 1 << 30;
 /// What a job costs beside the bytes of its scan, in bytes: it orders small jobs.
 const JOB_COST: u64 = 100_000;
 

@@ -2,13 +2,13 @@
 
 use darn_budget::Budget;
 
-use crate::compose::{Cut, Field, compose};
+use crate::compose::{ComposedLayer, Cut, Field, compose};
 use crate::density;
 use crate::features::Feature;
 use crate::frame::{Frame, bounds};
 use crate::gather::Gathered;
 use crate::input::{Cloth, LayerKind, PatchChart, Settings, TextureError};
-use crate::labels::{Labelling, choose};
+use crate::labels::choose;
 use crate::offsets::{Candidate, spread};
 use crate::search::{Found, search, unshade};
 use crate::shading::Shading;
@@ -46,7 +46,7 @@ impl PatchTexture {
     }
 }
 
-/// A hole with the places that its texels are copied from, found once for all layers.
+/// A hole with the offsets at which the cloth around it may be like itself, found once for all layers.
 pub struct Completion<'a> {
     pub(crate) cloth: &'a Cloth<'a>,
     pub(crate) patch: &'a PatchChart,
@@ -54,7 +54,10 @@ pub struct Completion<'a> {
     pub(crate) gathered: Gathered,
     /// Offsets at which the cloth may be like itself.
     pub(crate) offsets: Vec<Candidate>,
-    labelling: Labelling,
+    /// Few of them that together suit every place of the hole.
+    candidates: Vec<Candidate>,
+    /// Mean squared difference of unrelated places of the cloth.
+    unserved: f32,
     /// The light over the cloth, which the features are without.
     shading: Option<Shading>,
     bytes: usize,
@@ -97,7 +100,7 @@ pub(crate) fn cut(frame: &Frame, patch: &PatchChart, settings: &Settings) -> Cut
 }
 
 impl<'a> Completion<'a> {
-    /// Reads the cloth's images and finds where each texel of the hole is copied from. Its memory is held in the budget until
+    /// Reads the cloth's images and finds the offsets at which the cloth is like itself. Its memory is held in the budget until
     /// [`Completion::release`].
     ///
     /// # Errors
@@ -136,14 +139,14 @@ impl<'a> Completion<'a> {
             unserved,
             shading,
         } = search(&mut gathered, budget)?;
-        let labelling = choose(&gathered.raster(), (&candidates, unserved), budget)?;
         Ok(Completion {
             cloth,
             patch,
             settings: *settings,
             gathered,
             offsets: all,
-            labelling,
+            candidates,
+            unserved,
             shading,
             bytes: 0,
         })
@@ -157,7 +160,7 @@ impl<'a> Completion<'a> {
     /// Features in even light.
     pub(crate) fn unshaded(&self, mut features: Vec<Feature>, shown: &[bool]) -> Vec<Feature> {
         if let Some(shading) = &self.shading {
-            unshade(&mut features, shown, (shading, self.gathered.frame.width));
+            unshade(&mut features, shown, shading, self.gathered.frame.width);
         }
         features
     }
@@ -184,14 +187,15 @@ impl<'a> Completion<'a> {
             .collect()
     }
 
-    /// The patch's images.
+    /// The patch's images: chooses where each texel of the hole is copied from, and copies it in all layers.
     ///
     /// # Errors
     /// `Exhausted`.
     pub fn texture(&self, budget: &Budget) -> Result<PatchTexture, TextureError> {
         let cut = self.cut();
         let raster = self.gathered.raster();
-        let field = Field::new(&self.gathered, &self.labelling, budget)?;
+        let labelling = choose(&raster, &self.candidates, self.unserved, budget)?;
+        let field = Field::new(&self.gathered, &labelling, budget)?;
         let samples = spread(&self.gathered.near, 1200);
         let layers = (self.cloth.layers.iter().zip(&self.gathered.layers))
             .map(|(kind, layer)| {
@@ -199,16 +203,14 @@ impl<'a> Completion<'a> {
                 let shaded = self.gathered.mirror.is_none()
                     && matches!(kind, LayerKind::BaseColour | LayerKind::Colour);
                 let shading = shaded
-                    .then(|| Field::shading(&raster, &self.labelling, layer, &samples))
+                    .then(|| Field::shading(&raster, &labelling, layer, &samples))
                     .flatten();
-                let layer = (*kind, layer.as_slice());
-                Ok(compose(
-                    &self.gathered,
-                    &field,
-                    layer,
-                    (&cut, shading.as_ref()),
-                    budget,
-                )?)
+                let layer = ComposedLayer {
+                    kind: *kind,
+                    texels: layer,
+                    shading: shading.as_ref(),
+                };
+                Ok(compose(&self.gathered, &field, &layer, &cut, budget)?)
             })
             .collect::<Result<Vec<_>, TextureError>>()?;
         let frame = &self.gathered.frame;

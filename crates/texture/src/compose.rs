@@ -9,7 +9,7 @@ use crate::gather::Gathered;
 use crate::input::LayerKind;
 use crate::labels::{Labelling, UNLABELLED};
 use crate::offsets::{Known, Offset};
-use crate::resample::encode_normal;
+use crate::resample::encode_vector;
 use crate::shading::{Pair, Shading};
 
 /// Nanoseconds of work for a texel of the hole.
@@ -147,14 +147,28 @@ impl Cut {
     }
 }
 
+/// A layer of the raster that is to be composed.
+pub(crate) struct ComposedLayer<'a> {
+    pub kind: LayerKind,
+    /// On all pages.
+    pub texels: &'a [[u8; 4]],
+    /// The light over its cloth.
+    pub shading: Option<&'a Shading>,
+}
+
 /// One layer's picture of a cut: known texels bit for bit, copies in the hole, colours of their surroundings elsewhere.
 pub(crate) fn compose(
     gathered: &Gathered,
     field: &Field,
-    (kind, layer): (LayerKind, &[[u8; 4]]),
-    (cut, shading): (&Cut, Option<&Shading>),
+    layer: &ComposedLayer,
+    cut: &Cut,
     budget: &Budget,
 ) -> Result<Vec<[u8; 4]>, Exhausted> {
+    let ComposedLayer {
+        kind,
+        texels: layer,
+        shading,
+    } = *layer;
     let width = gathered.frame.width;
     let picture = Picture {
         width,
@@ -172,7 +186,7 @@ pub(crate) fn compose(
     let covered: Vec<bool> = (0..cut.len())
         .map(|k| gathered.known[at(k)] || field.source[at(k)] != NONE)
         .collect();
-    if kind != LayerKind::Normal {
+    if !kind.is_vector() {
         let correction = solve(picture.equation(cut, &values), budget)?;
         values
             .par_iter_mut()
@@ -189,10 +203,8 @@ pub(crate) fn compose(
             if gathered.known[texel] {
                 return layer[texel];
             }
-            if kind == LayerKind::Normal {
-                let vector = |x: f32| (255.0 * x - 128.0) / 127.0;
-                let [x, y, z, _] = values[k].map(vector);
-                return encode_normal([x, y, z]);
+            if kind.is_vector() {
+                return encode_vector(kind, values[k]);
             }
             values[k].map(|x| (255.0 * x.clamp(0.0, 1.0) + 0.5) as u8)
         })

@@ -8,7 +8,7 @@ use crate::features::{Feature, distance, features};
 use crate::frame::{NONE, owners};
 use crate::input::{CornerTexcoords, TextureError};
 use crate::offsets::{Offset, spread};
-use crate::resample::{Placed, resample};
+use crate::resample::{OwnedRaster, Placed, resample};
 
 /// The patch with places in the scan's images, as `Source::texcoords` of the cloth count them.
 #[derive(Debug, Clone, Default)]
@@ -32,10 +32,22 @@ pub struct ContinuedScore {
     pub hole: f64,
     /// The same of the cloth around the hole itself.
     pub cloth: f64,
+    /// Whether the patch's coordinates go on as one map with the cloth's, and show about as much there as around.
+    pub is_one_map: bool,
 }
 
 /// The patch may be this many times as unlike as the cloth is to itself.
 const MOST_RATIO: f64 = 1.35;
+/// The same where the coordinates go on as one map: a border or a large print in the hole may be unlike all that is around it.
+const MOST_RATIO_OF_MAP: f64 = 2.6;
+/// How far the map of a face of the patch may be from the cloth's mean map, as a share of that.
+const MOST_CHANGE: f64 = 0.35;
+/// How far the mean of the patch's features may be from the cloth's, and how much of the cloth's deviation it must have, in the cloth's standard
+/// deviations: an unused part of an image is plain.
+const MOST_SHIFT: f64 = 1.0;
+const LEAST_DEVIATION: f64 = 0.6;
+/// Share of the patch's area that must have the cloth's map.
+const LEAST_ALIKE: f64 = 0.97;
 /// Differences that nobody sees.
 const UNSEEN: f64 = 0.012;
 /// Places that are compared, in the hole and in the cloth each.
@@ -49,7 +61,11 @@ const PLACE_WORK: u64 = 120;
 impl ContinuedScore {
     /// Whether continuing is as good as a texture of the patch's own.
     pub fn is_as_good(&self) -> bool {
-        self.hole <= MOST_RATIO * self.cloth + UNSEEN
+        let most = match self.is_one_map {
+            true => MOST_RATIO_OF_MAP,
+            false => MOST_RATIO,
+        };
+        self.hole <= most * self.cloth + UNSEEN
     }
 }
 
@@ -103,7 +119,10 @@ impl Completion<'_> {
                 self.cloth,
                 layer,
                 &continued.placed(),
-                (&self.gathered.frame, &owner),
+                &OwnedRaster {
+                    frame: &self.gathered.frame,
+                    owners: &owner,
+                },
                 budget,
             )?;
             for (at, texel) in texels
@@ -150,7 +169,58 @@ impl Completion<'_> {
         Ok(ContinuedScore {
             hole: mean(&holes),
             cloth: mean(&cloth),
+            is_one_map: self.is_one_map(continued) && self.shows_as_much(&look),
         })
+    }
+
+    /// Whether the hole is about as bright and as varied as the cloth near it.
+    fn shows_as_much(&self, look: &[Feature]) -> bool {
+        let of = |mask: &[bool]| {
+            let shown = || look.iter().zip(mask).filter(|(_, shown)| **shown);
+            let count = shown().count().max(1) as f64;
+            let mean = [0, 1, 2, 3]
+                .map(|k: usize| shown().map(|(f, _)| f64::from(f[k])).sum::<f64>() / count);
+            let square =
+                |f: &Feature| -> f64 { (0..4).map(|k| (f64::from(f[k]) - mean[k]).powi(2)).sum() };
+            let deviation = (shown().map(|(f, _)| square(f)).sum::<f64>() / count).sqrt();
+            (mean, deviation)
+        };
+        let (hole, cloth) = (of(&self.gathered.missing), of(&self.gathered.near));
+        let shift = (0..4)
+            .map(|k| (hole.0[k] - cloth.0[k]).powi(2))
+            .sum::<f64>();
+        shift.sqrt() <= MOST_SHIFT * cloth.1 && hole.1 >= LEAST_DEVIATION * cloth.1
+    }
+
+    /// Whether a continued patch has the map of the cloth around it: from the chart to the coordinates, in one piece.
+    fn is_one_map(&self, continued: &ContinuedPatch) -> bool {
+        let mut places = std::collections::BTreeSet::new();
+        let is_whole = (continued.flat.iter()).all(|p| places.insert(p.map(f64::to_bits)));
+        let mut materials = self.cloth.material_of.iter().chain(&continued.material_of);
+        let first = materials.next();
+        let is_one_material = materials.all(|material| Some(material) == first);
+        let mut sets = self.cloth.materials.iter().flatten();
+        let Some(source) = sets.find(|source| source.image.is_some()) else {
+            return false;
+        };
+        let set = source.texcoords;
+        let of_cloth = maps(&Placed::of(self.cloth), set);
+        let (mut mean, mut area) = ([0.0; 4], 0.0);
+        for (map, own) in of_cloth {
+            (0..4).for_each(|k| mean[k] += own * map[k]);
+            area += own;
+        }
+        let mean = mean.map(|x| x / area);
+        let size = |map: [f64; 4]| map.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let (mut alike, mut all) = (0.0, 0.0);
+        for (map, own) in maps(&continued.placed(), set) {
+            let change = size([0, 1, 2, 3].map(|k: usize| map[k] - mean[k]));
+            all += own;
+            if change < MOST_CHANGE * size(mean) {
+                alike += own;
+            }
+        }
+        is_whole && is_one_material && alike >= LEAST_ALIKE * all
     }
 
     /// The least mean squared difference of a window with the known cloth at any offset.
@@ -200,4 +270,30 @@ impl Completion<'_> {
             .map(|k| layers[0][cut.texel(k, self.gathered.frame.width)])
             .collect())
     }
+}
+
+/// Per face the derivatives of the texture coordinates in the chart (∂u/∂x, ∂v/∂x, ∂u/∂y, ∂v/∂y), and its area in the chart.
+fn maps<'p>(placed: &Placed<'p>, set: usize) -> impl Iterator<Item = ([f64; 4], f64)> + use<'p> {
+    let (flat, faces) = (placed.flat, placed.faces);
+    let texcoords = placed.texcoords.get(set).map_or(&[][..], Vec::as_slice);
+    faces
+        .iter()
+        .zip(texcoords)
+        .filter_map(move |(face, corners)| {
+            let [a, b, c] = face.map(|v| flat[v as usize]);
+            let (e, f) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
+            let doubled = e[0] * f[1] - e[1] * f[0];
+            let change =
+                |k: usize, of: usize| f64::from(corners[k][of]) - f64::from(corners[0][of]);
+            let along = |of: usize| {
+                let (s, t) = (change(1, of), change(2, of));
+                [
+                    (s * f[1] - t * e[1]) / doubled,
+                    (t * e[0] - s * f[0]) / doubled,
+                ]
+            };
+            let ([ux, uy], [vx, vy]) = (along(0), along(1));
+            let map = [ux, vx, uy, vy];
+            (map.iter().all(|x| x.is_finite())).then_some((map, doubled.abs()))
+        })
 }

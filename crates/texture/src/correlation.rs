@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::features::Feature;
-use crate::fft::{Complex, transform};
+use crate::fft::{Complex, fast_length, transform};
 
 /// Share of the known texels that must meet known texels for an offset to be judged.
 const LEAST_OVERLAP: f32 = 0.04;
@@ -45,7 +45,7 @@ impl SelfDifference {
             .into_iter()
             .filter_map(|[x, y]| self.at(dx + x, dy + y));
         let (sum, count) = others.fold((0.0, 0.0), |(sum, count), x| (sum + x, count + 1.0f32));
-        let [overlap, _] = self.sums[self.index(dx, dy)];
+        let overlap = self.sums[self.index(dx, dy)].re;
         (sum / count.max(1.0) - own).max(0.0) * overlap
     }
 
@@ -68,7 +68,7 @@ impl SelfDifference {
         if dx.abs() > self.reach[0] || dy.abs() > self.reach[1] {
             return None;
         }
-        let [count, sum] = self.sums[self.index(dx, dy)];
+        let Complex { re: count, im: sum } = self.sums[self.index(dx, dy)];
         (count >= self.least).then(|| (sum / count).max(0.0))
     }
 }
@@ -84,7 +84,7 @@ pub(crate) fn self_difference(
     let height = known.len() / width;
     let scale = width.max(height).div_ceil(most);
     let (columns, rows) = (width.div_ceil(scale), height.div_ceil(scale));
-    let side = (2 * columns.max(rows)).next_power_of_two();
+    let side = fast_length(2 * columns.max(rows));
     let (mean, variance) = spread(features, known);
     let cell = |at: usize| -> Option<Feature> {
         let (column, row) = (at % columns, at / columns);
@@ -101,7 +101,7 @@ pub(crate) fn self_difference(
         (2 * count >= scale * scale).then(|| sum.map(|x| x / count as f32))
     };
     let cells: Vec<Option<Feature>> = (0..columns * rows).into_par_iter().map(cell).collect();
-    let empty = vec![[0.0f32; 2]; side * side];
+    let empty = vec![Complex::default(); side * side];
     let mut pictures = [empty.clone(), empty.clone(), empty];
     let mut total = 0.0f32;
     for (k, cell) in cells.iter().enumerate() {
@@ -109,40 +109,36 @@ pub(crate) fn self_difference(
         // Without the mean, which would only cost precision.
         let f: Feature = std::array::from_fn(|k| cell[k] - mean[k]);
         let at = k / columns * side + k % columns;
-        pictures[0][at] = [1.0, f.iter().map(|x| x * x).sum()];
-        pictures[1][at] = [f[0], f[1]];
-        pictures[2][at] = [f[2], f[3]];
+        pictures[0][at] = Complex::new(1.0, f.iter().map(|x| x * x).sum());
+        pictures[1][at] = Complex::new(f[0], f[1]);
+        pictures[2][at] = Complex::new(f[2], f[3]);
         total += 1.0;
     }
-    let [mask, first, second] = pictures.map(|picture| transform(picture, side));
+    let [mask, first, second] = pictures.map(|picture| transform(picture, side, rows));
     let opposite = |k: usize| {
         let back = |k: usize| (side - k) % side;
         back(k / side) * side + back(k % side)
     };
-    let power = |z: &[Complex], k: usize, o: usize| {
-        0.5 * (z[k][0] * z[k][0] + z[k][1] * z[k][1] + z[o][0] * z[o][0] + z[o][1] * z[o][1])
-    };
+    let power = |z: &[Complex], k: usize, o: usize| 0.5 * (z[k].norm_sqr() + z[o].norm_sqr());
     // The spectra of mask m and energy e from that of m + i e; the correlations of real pictures that are added to their mirror images have
     // real spectra, so one transform inverts two.
     let spectrum: Vec<Complex> = (0..side * side)
+        .into_par_iter()
         .map(|k| {
             let o = opposite(k);
-            let m = [
-                0.5 * (mask[k][0] + mask[o][0]),
-                0.5 * (mask[k][1] - mask[o][1]),
-            ];
-            let e = [
-                0.5 * (mask[k][1] + mask[o][1]),
-                0.5 * (mask[o][0] - mask[k][0]),
-            ];
-            let both = 2.0 * (m[0] * e[0] + m[1] * e[1]);
+            let m = 0.5 * (mask[k] + mask[o].conj());
+            let e = Complex::new(
+                0.5 * (mask[k].im + mask[o].im),
+                0.5 * (mask[o].re - mask[k].re),
+            );
+            let both = 2.0 * (m.re * e.re + m.im * e.im);
             let itself = power(&first, k, o) + power(&second, k, o);
-            [m[0] * m[0] + m[1] * m[1], both - 2.0 * itself]
+            Complex::new(m.norm_sqr(), both - 2.0 * itself)
         })
         .collect();
     let scale_back = 1.0 / (side * side) as f32;
-    let mut sums = transform(spectrum, side);
-    sums.iter_mut().for_each(|s| *s = s.map(|x| x * scale_back));
+    let mut sums = transform(spectrum, side, side);
+    sums.iter_mut().for_each(|s| *s *= scale_back);
     SelfDifference {
         scale,
         reach: [columns as i32 - 1, rows as i32 - 1],

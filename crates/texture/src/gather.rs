@@ -8,7 +8,8 @@ use crate::frame::{Frame, NONE, bounds, owners};
 use crate::input::{Cloth, PatchChart, Settings, TextureError};
 use crate::mirror::{Reflection, reflection};
 use crate::offsets::Known;
-use crate::resample::{Placed, resample};
+use crate::resample::{OwnedRaster, Placed, resample};
+use crate::seams::leave_cuts;
 
 /// Nanoseconds of work for a texel of the raster.
 const TEXEL_WORK: u64 = 40;
@@ -60,6 +61,7 @@ impl Gathered {
             mirror: None,
         };
         gathered.add_page(cloth, &cloth.flat, &owner, budget)?;
+        leave_cuts(cloth, &frame, &mut gathered.known);
         if !gathered.known.contains(&true) {
             return Err(TextureError::Nothing("cloth in the raster"));
         }
@@ -169,14 +171,12 @@ impl Gathered {
             flat,
             ..Placed::of(cloth)
         };
+        let owned = OwnedRaster {
+            frame: &self.frame,
+            owners: owner,
+        };
         for (layer, texels) in self.layers.iter_mut().enumerate() {
-            texels.extend(resample(
-                cloth,
-                layer,
-                &placed,
-                (&self.frame, owner),
-                budget,
-            )?);
+            texels.extend(resample(cloth, layer, &placed, &owned, budget)?);
         }
         self.known.extend(owner.iter().map(|o| *o != NONE));
         Ok(())

@@ -30,8 +30,10 @@ pub enum LayerKind {
     BaseColour,
     /// sRGB colour, such as emission or sheen colour.
     Colour,
-    /// Tangent-space vectors.
+    /// Tangent-space normals.
     Normal,
+    /// A direction in the tangent plane in red and green; a linear number in blue.
+    Direction,
     /// Linear numbers, such as occlusion, roughness and metallic.
     Data,
 }
@@ -40,6 +42,11 @@ impl LayerKind {
     /// Whether red, green and blue are sRGB-encoded.
     pub(crate) fn is_srgb(self) -> bool {
         matches!(self, LayerKind::BaseColour | LayerKind::Colour)
+    }
+
+    /// Whether red and green are the coordinates of a vector, which turns with the image.
+    pub(crate) fn is_vector(self) -> bool {
+        matches!(self, LayerKind::Normal | LayerKind::Direction)
     }
 }
 

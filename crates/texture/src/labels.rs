@@ -107,7 +107,8 @@ pub(crate) struct Labelling {
 /// Chooses among offsets for all places.
 pub(crate) fn choose(
     raster: &Known,
-    (candidates, unserved): (&[Candidate], f32),
+    candidates: &[Candidate],
+    unserved: f32,
     budget: &Budget,
 ) -> Result<Labelling, Exhausted> {
     let places = Places::over(raster);
@@ -261,7 +262,7 @@ impl Round<'_> {
             .par_iter()
             .map(|candidate| {
                 budget.spend(PLACE_WORK * self.texels.len() as u64)?;
-                Ok(self.cost(candidate, (&look, &weights), labelling.places.columns))
+                Ok(self.cost(candidate, &look, &weights, labelling.places.columns))
             })
             .collect()
     }
@@ -288,7 +289,8 @@ impl Round<'_> {
     fn cost(
         &self,
         candidate: &Candidate,
-        (look, weights): (&[Feature], &[f32]),
+        look: &[Feature],
+        weights: &[f32],
         columns: usize,
     ) -> Vec<f32> {
         let rows = self.texels.len() / columns;

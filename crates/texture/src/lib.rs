@@ -35,10 +35,12 @@ mod gather;
 mod gutter;
 mod input;
 mod labels;
+mod mean;
 mod mirror;
 mod offsets;
 mod resample;
 mod sample;
+mod seams;
 mod search;
 mod selection;
 mod shading;
@@ -52,4 +54,5 @@ pub use input::{
     Cloth, CornerTexcoords, LayerKind, PatchChart, Settings, Source, SourceImage, TextureError,
     Wrap,
 };
+pub use mean::mean_texels;
 pub use tangent::tangents;

@@ -192,7 +192,8 @@ fn grid(raster: &Known) -> Vec<Offset> {
 fn differences(
     raster: &Known,
     sectors: &[Vec<Sample>; SECTORS],
-    (offset, most): (Offset, usize),
+    offset: Offset,
+    most: usize,
 ) -> [Option<f32>; SECTORS + 1] {
     let mut sums = [None; SECTORS + 1];
     let mean = |sum: f32, count: usize, samples: usize| {
@@ -230,7 +231,7 @@ fn refine(
     for dy in -reach..=reach {
         for dx in -reach..=reach {
             let offset = [seed[0] + dx, seed[1] + dy];
-            let found = differences(raster, sectors, (offset, FEW_SAMPLES));
+            let found = differences(raster, sectors, offset, FEW_SAMPLES);
             for (best, found) in best.iter_mut().zip(found) {
                 if let Some(found) = found
                     && best.is_none_or(|(least, _)| found < least)
@@ -246,7 +247,7 @@ fn refine(
     offsets
         .into_iter()
         .filter_map(|offset| {
-            let found = differences(raster, sectors, (offset, SAMPLES));
+            let found = differences(raster, sectors, offset, SAMPLES);
             let difference = found.into_iter().flatten().max_by(f32::total_cmp)?;
             Some(Candidate { offset, difference })
         })

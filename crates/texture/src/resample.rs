@@ -33,14 +33,21 @@ impl<'a> Placed<'a> {
     }
 }
 
+/// A raster and the face that owns each of its texels.
+pub(crate) struct OwnedRaster<'a> {
+    pub frame: &'a Frame,
+    pub owners: &'a [u32],
+}
+
 /// One layer at every texel that a face owns, encoded as the layer's images are; zero elsewhere.
 pub(crate) fn resample(
     cloth: &Cloth,
     layer: usize,
     placed: &Placed,
-    (frame, owners): (&Frame, &[u32]),
+    owned: &OwnedRaster,
     budget: &Budget,
 ) -> Result<Vec<[u8; 4]>, Exhausted> {
+    let OwnedRaster { frame, owners } = *owned;
     let kind = cloth.layers[layer];
     let samplers: Vec<Option<Sampler>> = (cloth.materials.iter())
         .map(|sources| {
@@ -150,10 +157,11 @@ impl FaceReader {
                 sampler.read([u * width, v * height], footprint)
             }
             _ if kind == LayerKind::Normal => [0.5, 0.5, 1.0, 1.0],
+            _ if kind == LayerKind::Direction => [1.0, 0.5, 1.0, 1.0],
             _ => [1.0; 4],
         };
-        if kind == LayerKind::Normal {
-            return self.turned(value);
+        if kind.is_vector() {
+            return encode_vector(kind, self.turned(value));
         }
         (0..4).for_each(|k| value[k] *= self.factor[k]);
         if let Some(colour) = &self.colour {
@@ -170,22 +178,39 @@ impl FaceReader {
         }
     }
 
-    /// A normal of the image in the chart's frame: x along +x, y along +y.
-    fn turned(&self, value: [f32; 4]) -> [u8; 4] {
-        // 128 stands for zero, as most normal maps are made: 255 · 0.5 is between two bytes.
-        let [x, y, z] = [0, 1, 2].map(|k: usize| (value[k] * 255.0 - 128.0) / 127.0);
-        let (x, y) = (x * self.factor[0], y * self.factor[0]);
+    /// A vector of the image in the chart's frame: x along +x, y along +y.
+    fn turned(&self, value: [f32; 4]) -> [f32; 4] {
+        let [x, y] = [0, 1].map(|k: usize| coordinate(value[k]) * self.factor[0]);
         let [t, b] = self.tangents;
-        let turned = [x * t[0] + y * b[0], x * t[1] + y * b[1], z.max(1e-3)];
-        encode_normal(turned)
+        let number = |x: f32| (128.0 + 127.0 * x) / 255.0;
+        [
+            number(x * t[0] + y * b[0]),
+            number(x * t[1] + y * b[1]),
+            value[2],
+            value[3],
+        ]
     }
 }
 
-/// A vector's direction as a texel.
-pub(crate) fn encode_normal(v: [f32; 3]) -> [u8; 4] {
-    let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt().max(1e-12);
+/// A coordinate of a vector from a texel's channel. 128 stands for zero, as most normal maps are made: 255 · 0.5 is between two bytes.
+fn coordinate(channel: f32) -> f32 {
+    (channel * 255.0 - 128.0) / 127.0
+}
+
+/// A vector's direction as a texel. The blue of a [`LayerKind::Direction`] is a number of its own.
+pub(crate) fn encode_vector(kind: LayerKind, value: [f32; 4]) -> [u8; 4] {
+    let [x, y] = [0, 1].map(|k: usize| coordinate(value[k]));
+    let z = match kind {
+        LayerKind::Direction => 0.0,
+        _ => coordinate(value[2]).max(1e-3),
+    };
+    let length = (x * x + y * y + z * z).sqrt().max(1e-12);
     let byte = |x: f32| (128.0 + 127.0 * x / length).round().clamp(0.0, 255.0) as u8;
-    [byte(v[0]), byte(v[1]), byte(v[2]), 255]
+    let blue = match kind {
+        LayerKind::Direction => (255.0 * value[2].clamp(0.0, 1.0) + 0.5) as u8,
+        _ => byte(z),
+    };
+    [byte(x), byte(y), blue, 255]
 }
 
 /// The unit directions in the chart of x and y of tangent-space vectors. In glTF x goes along +u and y along −v (up in the image); the

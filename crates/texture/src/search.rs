@@ -41,7 +41,8 @@ pub(crate) fn search(gathered: &mut Gathered, budget: &Budget) -> Result<Found, 
         unshade(
             &mut features,
             &gathered.known[..gathered.frame.len()],
-            (shading, gathered.frame.width),
+            shading,
+            gathered.frame.width,
         );
         gathered.features = features;
         reduced = self::reduced(gathered, budget)?;
@@ -67,11 +68,7 @@ fn reduced(gathered: &Gathered, budget: &Budget) -> Result<[SelfDifference; 2], 
 }
 
 /// Takes light out of the features of the texels that are `shown`.
-pub(crate) fn unshade(
-    features: &mut [Feature],
-    shown: &[bool],
-    (shading, width): (&Shading, usize),
-) {
+pub(crate) fn unshade(features: &mut [Feature], shown: &[bool], shading: &Shading, width: usize) {
     for (at, feature) in features.iter_mut().enumerate().filter(|(at, _)| shown[*at]) {
         let light = shading.at([(at % width) as f32, (at / width) as f32]);
         (0..4).for_each(|k| feature[k] -= light[k]);

@@ -281,14 +281,13 @@ fn detail_finer_than_the_raster_is_averaged() {
 fn a_request_that_ends_ends_the_completion() {
     let scan = TestScan::new(Fabric::Plain, Layout::OneMap, 64);
     let cloth = scan.cloth();
-    let ends = |budget: &Budget| match Completion::new(
-        &cloth,
-        &scan.patch,
-        &Settings::default(),
-        budget,
-    ) {
-        Err(TextureError::Exhausted(exhausted)) => Some(exhausted),
-        _ => None,
+    let ends = |budget: &Budget| {
+        let made = Completion::new(&cloth, &scan.patch, &Settings::default(), budget)
+            .and_then(|completion| completion.texture(budget));
+        match made {
+            Err(TextureError::Exhausted(exhausted)) => Some(exhausted),
+            _ => None,
+        }
     };
     let limited = |limits: Limits| ends(&Budget::new(limits, &|| false));
     assert!(matches!(

@@ -1,0 +1,511 @@
+//! The colour of patches: the scan's texture coordinates continued, images of their own, one colour, or none.
+//!
+//! Left to itself, a patch continues the texture coordinates where that shows it as the cloth around it looks, by a measure of the
+//! completion's; elsewhere, as on an atlas of islands, it gets images of its own. The chart does not change with the cloth's folds, so a
+//! session completes a hole's images once.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use darn_budget::{Budget, Exhausted};
+use darn_contract::{TextureChoice, v1};
+use darn_geometry::mesh::Vec3;
+use darn_gltf_scan::{
+    ClothLook, DecodedImage, ImageError, NoLook, OwnTexture, PatchAppearance, PatchPrimitive,
+    ScanLimits,
+};
+use darn_texture::{
+    Completion, PatchTexture, Settings, TextureError, estimated_bytes, mean_texels,
+};
+use rayon::prelude::*;
+
+use crate::addition::{DressedPatch, PatchSource};
+use crate::error::MendError;
+use crate::hole::Hole;
+use crate::hole_report::FilledHole;
+use crate::texture_cloth::{Images, TextureCloth};
+use crate::timings::milliseconds;
+
+/// Why a patch has no images of its own where the request asks for none in particular.
+const NO_CHART: &str = "the cloth around the hole has no chart to lay a texture in";
+
+/// A patch as it goes to the scan, and what its report says.
+pub struct ColouredPatch {
+    /// The primitive.
+    pub primitive: PatchPrimitive,
+    /// Where its colour comes from.
+    pub report: v1::TextureReport,
+    /// Milliseconds.
+    pub texture_ms: f64,
+}
+
+/// How a hole's patch looks, whatever its folds.
+#[derive(Debug)]
+struct HoleTexture {
+    style: TextureStyle,
+    report: v1::TextureReport,
+}
+
+#[derive(Debug)]
+enum TextureStyle {
+    Continued,
+    Own(OwnImages),
+    Flat(Arc<ClothLook>, Vec<[f32; 4]>),
+}
+
+/// A patch's own images, and the patch in the chart.
+#[derive(Debug)]
+struct OwnImages {
+    look: Arc<ClothLook>,
+    texture: PatchTexture,
+    layers: Arc<Vec<Vec<[u8; 4]>>>,
+    chart: darn_texture::PatchChart,
+}
+
+/// The textures that a hole's patch was given, by what was asked for; they do not depend on its folds.
+#[derive(Default)]
+pub struct HoleTextures(Mutex<Vec<(Option<TextureChoice>, Arc<HoleTexture>)>>);
+
+impl HoleTextures {
+    fn get(&self, choice: Option<TextureChoice>) -> Option<Arc<HoleTexture>> {
+        let kept = self.lock();
+        let mut each = kept.iter();
+        each.find(|(c, _)| *c == choice).map(|(_, t)| Arc::clone(t))
+    }
+
+    fn keep(&self, choice: Option<TextureChoice>, texture: HoleTexture) {
+        self.lock().push((choice, Arc::new(texture)));
+    }
+
+    /// Bytes of memory.
+    pub fn bytes(&self) -> usize {
+        let kept = self.lock();
+        let each = kept.iter().map(|(_, texture)| match &texture.style {
+            TextureStyle::Own(own) => {
+                4 * own.layers.iter().map(Vec::len).sum::<usize>() + 16 * own.chart.flat.len()
+            }
+            _ => 0,
+        });
+        each.sum()
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, Vec<(Option<TextureChoice>, Arc<HoleTexture>)>> {
+        // No change under the lock can panic half-way.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// What colours the patches of one request.
+pub struct Colouring<'a> {
+    /// Where patches get their attributes from.
+    pub source: PatchSource<'a>,
+    /// What the request asks for.
+    pub choice: Option<TextureChoice>,
+    /// Limits of a patch's images.
+    pub settings: Settings,
+    /// Limits of the scan's images.
+    pub scan_limits: &'a ScanLimits,
+}
+
+/// Bytes that completions done at once may take together; a larger one is done alone.
+const AT_ONCE: usize = 256 << 20;
+/// Holes whose cloth is laid out at once.
+const LAID_AT_ONCE: usize = 64;
+
+/// A hole whose texture is to be made.
+#[derive(Clone)]
+struct TextureTask<'t> {
+    /// Index among the filled holes.
+    index: usize,
+    hole: &'t Hole,
+    look: Arc<ClothLook>,
+}
+
+/// The cloth of a task.
+struct LaidTask<'t> {
+    task: TextureTask<'t>,
+    laid: TextureCloth<'t>,
+    /// Bytes that its completion takes.
+    bytes: Result<usize, TextureError>,
+    laid_ms: f64,
+}
+
+impl Colouring<'_> {
+    /// The patches with their colours, in order. What fits into the request's memory does not depend on threads: the holes are taken in
+    /// order, as many at once as stay within a fixed size.
+    ///
+    /// # Errors
+    /// `Exhausted`.
+    pub fn coloured(
+        &self,
+        filled: &[FilledHole],
+        dressed: Vec<DressedPatch>,
+    ) -> Result<Vec<ColouredPatch>, MendError> {
+        let mut times = vec![0.0; filled.len()];
+        let mut images = ImageCache::default();
+        let tasks = self.tasks(filled, &dressed, &mut images)?;
+        for tasks in tasks.chunks(LAID_AT_ONCE) {
+            let laid = tasks.par_iter().map(|task| {
+                let started = Instant::now();
+                let laid = TextureCloth::of(
+                    task.hole,
+                    &dressed[task.index],
+                    self.source.scan,
+                    &task.look,
+                    &images.decoded,
+                );
+                LaidTask {
+                    task: task.clone(),
+                    bytes: estimated_bytes(&laid.cloth, &laid.patch, &self.settings),
+                    laid,
+                    laid_ms: milliseconds(started),
+                }
+            });
+            self.complete(laid.collect(), &mut times)?;
+        }
+        images.release(self.source.budget);
+        let all = filled.par_iter().zip(dressed).zip(times);
+        let all = all.map(|((filled, dressed), texture_ms)| {
+            let started = Instant::now();
+            let (primitive, report) = self.patch(filled, dressed);
+            ColouredPatch {
+                primitive,
+                report,
+                texture_ms: texture_ms + milliseconds(started),
+            }
+        });
+        Ok(all.collect())
+    }
+
+    /// The holes whose textures are to be completed, with their images decoded; what can be said of the others without is kept.
+    fn tasks<'t>(
+        &self,
+        filled: &'t [FilledHole],
+        dressed: &[DressedPatch],
+        images: &mut ImageCache,
+    ) -> Result<Vec<TextureTask<'t>>, MendError> {
+        let mut tasks = Vec::new();
+        if self.choice == Some(TextureChoice::None) {
+            return Ok(tasks);
+        }
+        for (index, (filled, dressed)) in filled.iter().zip(dressed).enumerate() {
+            let hole = filled.hole.charted();
+            let Some(hole) = hole.filter(|hole| hole.textures.get(self.choice).is_none()) else {
+                continue;
+            };
+            match self.look(dressed, images)? {
+                Ok(look) => tasks.push(TextureTask { index, hole, look }),
+                Err(without) => hole.textures.keep(self.choice, without),
+            }
+        }
+        Ok(tasks)
+    }
+
+    /// Completes the textures of holes, as many at once as their size allows.
+    fn complete(&self, mut laid: Vec<LaidTask>, times: &mut [f64]) -> Result<(), MendError> {
+        while !laid.is_empty() {
+            let left = self.source.budget.memory_left();
+            let mut sum = 0;
+            let fits = laid.iter().take_while(|task| {
+                sum += task.bytes.as_ref().map_or(0, |bytes| *bytes);
+                sum <= AT_ONCE.min(left)
+            });
+            let count = fits.count().max(1);
+            let rest = laid.split_off(count);
+            let done = std::mem::replace(&mut laid, rest).into_par_iter();
+            let done: Vec<Result<(usize, f64), MendError>> = done
+                .map(|task| {
+                    let (started, index, laid_ms) = (Instant::now(), task.task.index, task.laid_ms);
+                    self.complete_one(task, left)?;
+                    Ok((index, laid_ms + milliseconds(started)))
+                })
+                .collect();
+            for done in done {
+                let (index, milliseconds) = done?;
+                times[index] = milliseconds;
+            }
+        }
+        Ok(())
+    }
+
+    /// Completes the texture of a hole and keeps it; `left` is what memory there was before.
+    fn complete_one(&self, laid: LaidTask, left: usize) -> Result<(), MendError> {
+        let LaidTask {
+            task, laid, bytes, ..
+        } = laid;
+        let completed = match bytes {
+            Ok(bytes) if bytes > left => Ok(continued(format!(
+                "a texture of its own would take {} MiB, more than the request has left",
+                bytes >> 20
+            ))),
+            Ok(_) => self.completed(&task.look, laid),
+            Err(error) => Err(error),
+        };
+        let texture = match completed {
+            Ok(texture) => texture,
+            Err(TextureError::Exhausted(exhausted)) => return Err(exhausted.into()),
+            Err(reason) => continued(reason.to_string()),
+        };
+        task.hole.textures.keep(self.choice, texture);
+        Ok(())
+    }
+
+    /// A patch as it goes to the scan; its texture is made.
+    fn patch(
+        &self,
+        filled: &FilledHole,
+        dressed: DressedPatch,
+    ) -> (PatchPrimitive, v1::TextureReport) {
+        if self.choice == Some(TextureChoice::None) {
+            let (plain, _) = self
+                .source
+                .undivided(filled, &dressed, &no_columns(&dressed));
+            let report = report_of("none", String::new());
+            return (with(plain, PatchAppearance::Plain), report);
+        }
+        let kept = (filled.hole.charted()).and_then(|hole| hole.textures.get(self.choice));
+        let Some(texture) = kept else {
+            return (
+                dressed.primitive,
+                report_of("continued", self.why(NO_CHART)),
+            );
+        };
+        let primitive = match &texture.style {
+            TextureStyle::Continued => match self.choice {
+                Some(TextureChoice::Flat) => flat_colours(dressed.primitive),
+                _ => dressed.primitive,
+            },
+            TextureStyle::Own(own) => self.own(filled, &dressed, own),
+            TextureStyle::Flat(look, means) => {
+                let (flat, _) = self
+                    .source
+                    .undivided(filled, &dressed, &no_columns(&dressed));
+                with(flat, PatchAppearance::Flat(Arc::clone(look), means.clone()))
+            }
+        };
+        (primitive, texture.report.clone())
+    }
+
+    /// A reason that the report gives unless the request asked for just that.
+    fn why(&self, reason: impl Into<String>) -> String {
+        match self.choice {
+            Some(TextureChoice::Continue) => String::new(),
+            _ => reason.into(),
+        }
+    }
+
+    /// How the cloth around a hole looks, with its images decoded; inside, what a patch gets where that cannot be told.
+    fn look(
+        &self,
+        dressed: &DressedPatch,
+        images: &mut ImageCache,
+    ) -> Result<Result<Arc<ClothLook>, HoleTexture>, MendError> {
+        if self.choice == Some(TextureChoice::Continue) {
+            return Ok(Err(continued(String::new())));
+        }
+        let mut parts: Vec<usize> = dressed.sources.iter().flatten().map(|s| s.part).collect();
+        parts.sort_unstable();
+        parts.dedup();
+        let scan = self.source.scan;
+        let look = match scan.cloth_look(&parts, dressed.primitive.material_of) {
+            Ok(look) => images.shared(look),
+            Err(NoLook::NoTexture) if self.choice == Some(TextureChoice::Flat) => {
+                return Ok(Err(HoleTexture {
+                    style: TextureStyle::Continued,
+                    report: report_of("flat", String::new()),
+                }));
+            }
+            Err(reason) => return Ok(Err(continued(reason.to_string()))),
+        };
+        for image in look.images() {
+            if let Err(reason) = images.decode(image, self)? {
+                return Ok(Err(continued(reason)));
+            }
+        }
+        Ok(Ok(look))
+    }
+
+    /// The patch's images, or their means, or that it looks as good without.
+    fn completed(
+        &self,
+        look: &Arc<ClothLook>,
+        laid: TextureCloth,
+    ) -> Result<HoleTexture, TextureError> {
+        let (budget, settings) = (self.source.budget, &self.settings);
+        let TextureCloth {
+            cloth,
+            patch,
+            continued,
+        } = &laid;
+        if self.choice == Some(TextureChoice::Flat) {
+            let means = mean_texels(cloth, patch, settings, budget)?;
+            return Ok(HoleTexture {
+                style: TextureStyle::Flat(Arc::clone(look), means),
+                report: report_of("flat", String::new()),
+            });
+        }
+        let completion = Completion::new(cloth, patch, settings, budget)?;
+        let score = completion.score_continued(continued, budget)?;
+        let compared = |report: v1::TextureReport| v1::TextureReport {
+            continued_difference: Some(score.hole),
+            cloth_difference: Some(score.cloth),
+            ..report
+        };
+        if self.choice.is_none() && score.is_as_good() {
+            completion.release(budget);
+            let reason = "the continued texture looks like the cloth around the hole";
+            return Ok(HoleTexture {
+                style: TextureStyle::Continued,
+                report: compared(report_of("continued", reason.to_owned())),
+            });
+        }
+        let mut texture = completion.texture(budget)?;
+        completion.release(budget);
+        let reason = match self.choice {
+            None => "the continued texture does not look like the cloth around the hole",
+            Some(_) => "",
+        };
+        let report = v1::TextureReport {
+            width: texture.width,
+            height: texture.height,
+            layers: texture.layers.len() as u32,
+            ..compared(report_of("synthesized", reason.to_owned()))
+        };
+        let layers = std::mem::take(&mut texture.layers);
+        budget.hold(4 * layers.iter().map(Vec::len).sum::<usize>())?;
+        let own = OwnImages {
+            look: Arc::clone(look),
+            texture,
+            layers: Arc::new(layers),
+            chart: laid.patch,
+        };
+        Ok(HoleTexture {
+            style: TextureStyle::Own(own),
+            report,
+        })
+    }
+
+    /// The patch in its own images.
+    fn own(&self, filled: &FilledHole, dressed: &DressedPatch, own: &OwnImages) -> PatchPrimitive {
+        let points =
+            |of: &[Vec3]| -> Vec<[f64; 3]> { of.iter().map(|p| [p.x, p.y, p.z]).collect() };
+        let positions = points(&filled.patch.positions);
+        let tangents = darn_texture::tangents(&own.chart, &positions, &points(&dressed.normals));
+        let columns: Vec<Vec<f64>> = (own.texture.texcoords.iter().zip(&tangents))
+            .map(|(place, tangent)| place.iter().chain(tangent).map(|x| f64::from(*x)).collect())
+            .collect();
+        let (primitive, columns) = self.source.undivided(filled, dressed, &columns);
+        let number = |row: &Vec<f64>, k: usize| row.get(k).copied().unwrap_or_default() as f32;
+        let places = columns.iter().map(|row| [0, 1].map(|k| number(row, k)));
+        let tangents = columns
+            .iter()
+            .map(|row| [2, 3, 4, 5].map(|k| number(row, k)));
+        let appearance = OwnTexture {
+            look: Arc::clone(&own.look),
+            width: own.texture.width,
+            height: own.texture.height,
+            layers: Arc::clone(&own.layers),
+            tangents: tangents.collect(),
+        };
+        PatchPrimitive {
+            texcoords: vec![places.collect()],
+            ..with(primitive, PatchAppearance::Own(appearance))
+        }
+    }
+}
+
+/// A patch that continues the scan's texture coordinates, and why.
+fn continued(reason: String) -> HoleTexture {
+    HoleTexture {
+        style: TextureStyle::Continued,
+        report: report_of("continued", reason),
+    }
+}
+
+fn with(primitive: PatchPrimitive, appearance: PatchAppearance) -> PatchPrimitive {
+    PatchPrimitive {
+        appearance,
+        ..primitive
+    }
+}
+
+fn no_columns(dressed: &DressedPatch) -> Vec<Vec<f64>> {
+    vec![Vec::new(); dressed.normals.len()]
+}
+
+/// A patch with the mean of its colours at every vertex.
+fn flat_colours(mut primitive: PatchPrimitive) -> PatchPrimitive {
+    for set in &mut primitive.colors {
+        let count = set.len().max(1) as f64;
+        let mean = [0, 1, 2, 3].map(|k: usize| {
+            let sum: f64 = set.iter().map(|colour| f64::from(colour[k])).sum();
+            (sum / count) as f32
+        });
+        set.fill(mean);
+    }
+    primitive
+}
+
+fn report_of(method: &str, reason: String) -> v1::TextureReport {
+    v1::TextureReport {
+        method: method.to_owned(),
+        reason,
+        ..v1::TextureReport::default()
+    }
+}
+
+/// The images of a scan that the patches of one request need.
+#[derive(Default)]
+struct ImageCache {
+    decoded: Images,
+    /// Why an image was not decoded.
+    refused: BTreeMap<usize, String>,
+    /// The looks of the cloth around holes: mostly the same.
+    looks: Vec<Arc<ClothLook>>,
+}
+
+impl ImageCache {
+    /// The same look, if it is known.
+    fn shared(&mut self, look: ClothLook) -> Arc<ClothLook> {
+        if let Some(known) = self.looks.iter().find(|known| ***known == look) {
+            return Arc::clone(known);
+        }
+        self.looks.push(Arc::new(look));
+        Arc::clone(&self.looks[self.looks.len() - 1])
+    }
+
+    /// Decodes an image unless that was done before; `Err` inside is why it cannot be.
+    fn decode(
+        &mut self,
+        index: usize,
+        colouring: &Colouring,
+    ) -> Result<Result<(), String>, Exhausted> {
+        if self.decoded.contains_key(&index) {
+            return Ok(Ok(()));
+        }
+        if let Some(reason) = self.refused.get(&index) {
+            return Ok(Err(reason.clone()));
+        }
+        let PatchSource { scan, budget, .. } = colouring.source;
+        let reason = match scan.image(index, colouring.scan_limits, budget) {
+            Ok(image) => {
+                self.decoded.insert(index, Arc::new(image));
+                return Ok(Ok(()));
+            }
+            Err(ImageError::Exhausted(memory @ Exhausted::Memory { .. })) => {
+                format!("/images/{index}: {memory}")
+            }
+            Err(ImageError::Exhausted(exhausted)) => return Err(exhausted),
+            Err(ImageError::Unreadable(reason)) => reason,
+        };
+        self.refused.insert(index, reason.clone());
+        Ok(Err(reason))
+    }
+
+    /// Gives back the memory of the images.
+    fn release(self, budget: &Budget) {
+        let held = |image: &Arc<DecodedImage>| image.bytes_held();
+        budget.release(self.decoded.values().map(held).sum());
+    }
+}

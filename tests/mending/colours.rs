@@ -1,0 +1,580 @@
+//! The colour of patches: sheets of known fabrics, mended as files, and what a viewer would show where the hole was.
+
+use std::io::Cursor;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use darn_contract::port::Mended;
+use darn_contract::{Constraints, TextureChoice, v1};
+use darn_geometry::mesh::{TriMesh, Vec3};
+use darn_texture::testset::{Fabric, Layout, TestScan, ciede2000, lab};
+use serde_json::{Value, json};
+
+use super::cloth::{mended, packed, read};
+
+/// Texels to a unit of the scene.
+const SCALE: f64 = 100.0;
+/// Radius of the cylinder that the sheets lie on, texels.
+const BEND: f64 = 300.0;
+
+/// A point of the flat sheet on the cylinder.
+fn bent([x, y]: [f64; 2]) -> Vec3 {
+    let angle = x / BEND;
+    Vec3::new(BEND * angle.sin(), y, BEND * (angle.cos() - 1.0)) / SCALE
+}
+
+/// The place on the flat sheet.
+fn unbent(p: Vec3) -> [f64; 2] {
+    let p = p * SCALE;
+    [BEND * p.x.atan2(p.z + BEND), p.y]
+}
+
+fn png(side: usize, texels: &[[u8; 4]]) -> Vec<u8> {
+    let bytes: Vec<u8> = texels.iter().flatten().copied().collect();
+    let picture = image::RgbaImage::from_raw(side as u32, side as u32, bytes).expect("all texels");
+    let mut out = Cursor::new(Vec::new());
+    let written = picture.write_to(&mut out, image::ImageFormat::Png);
+    written.expect("a PNG");
+    out.into_inner()
+}
+
+fn push(list: &mut Value, value: Value) {
+    list.as_array_mut().expect("a list").push(value);
+}
+
+fn data_uri(bytes: &[u8]) -> String {
+    format!("data:image/png;base64,{}", STANDARD.encode(bytes))
+}
+
+/// The chunks of a GLB: its JSON and the bytes of its buffer.
+fn chunks(glb: &[u8]) -> (Value, &[u8]) {
+    let word =
+        |at: usize| u32::from_le_bytes(glb[at..at + 4].try_into().expect("four bytes")) as usize;
+    let text = &glb[20..20 + word(12)];
+    let bin = 28 + word(12);
+    (
+        serde_json::from_slice(text).expect("JSON"),
+        glb.get(bin..).unwrap_or_default(),
+    )
+}
+
+/// A GLB with an edited JSON.
+fn edited(glb: &[u8], edit: impl FnOnce(&mut Value)) -> Vec<u8> {
+    let (mut json, bin) = chunks(glb);
+    edit(&mut json);
+    let mut text = json.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let mut out = b"glTF\x02\0\0\0".to_vec();
+    let length = 12 + 8 + text.len() + 8 + bin.len();
+    out.extend((length as u32).to_le_bytes());
+    out.extend((text.len() as u32).to_le_bytes());
+    out.extend(b"JSON");
+    out.extend(text);
+    out.extend((bin.len() as u32).to_le_bytes());
+    out.extend(b"BIN\0");
+    out.extend(bin);
+    out
+}
+
+/// A sheet of a fabric as a file: bent, with its image as base colour.
+fn fabric(sheet: &TestScan) -> Vec<u8> {
+    let positions = sheet.mesh.positions.iter().map(|p| bent([p.x, p.y]));
+    let mesh = TriMesh {
+        positions: positions.collect(),
+        faces: sheet.mesh.faces.clone(),
+    };
+    edited(&packed(&mesh, &sheet.texcoords), |json| {
+        json["images"] = json!([{ "uri": data_uri(&png(sheet.side, &sheet.texels)) }]);
+        json["textures"] = json!([{ "source": 0 }]);
+        json["materials"][0] = json!({
+            "name": "cloth",
+            "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 }, "metallicFactor": 0.0 },
+        });
+    })
+}
+
+fn with_texture(texture: Option<TextureChoice>) -> Constraints {
+    Constraints {
+        texture,
+        ..Constraints::default()
+    }
+}
+
+/// A mended file and the primitive of its patch.
+struct Patched {
+    json: Value,
+    bin: Vec<u8>,
+    primitive: Value,
+    report: v1::TextureReport,
+}
+
+impl Patched {
+    fn of(mended: &Mended) -> Patched {
+        let (json, bin) = chunks(&mended.bytes);
+        let all = json["meshes"].as_array().expect("meshes").iter();
+        let mut all = all.flat_map(|mesh| mesh["primitives"].as_array().expect("primitives"));
+        let new = |primitive: &&Value| primitive.pointer("/extras/darn/reconstructed").is_some();
+        Patched {
+            primitive: all.find(new).expect("a patch").clone(),
+            bin: bin.to_vec(),
+            report: mended.report.holes[0].texture.clone().expect("a texture"),
+            json,
+        }
+    }
+
+    fn view(&self, index: &Value) -> &[u8] {
+        let view = &self.json["bufferViews"][index.as_u64().expect("an index") as usize];
+        let number = |key: &str| view[key].as_u64().unwrap_or(0) as usize;
+        &self.bin[number("byteOffset")..][..number("byteLength")]
+    }
+
+    fn floats<const N: usize>(&self, attribute: &str) -> Vec<[f32; N]> {
+        let accessor = self.primitive["attributes"][attribute].as_u64();
+        let accessor = &self.json["accessors"][accessor.expect(attribute) as usize];
+        let bytes = self.view(&accessor["bufferView"]);
+        let numbers: Vec<f32> = (bytes.chunks_exact(4))
+            .map(|b| f32::from_le_bytes(b.try_into().expect("four bytes")))
+            .collect();
+        numbers.as_chunks().0.to_vec()
+    }
+
+    fn faces(&self) -> Vec<[usize; 3]> {
+        let accessor =
+            &self.json["accessors"][self.primitive["indices"].as_u64().expect("i") as usize];
+        let bytes = self.view(&accessor["bufferView"]);
+        let size = if accessor["componentType"] == 5123 {
+            2
+        } else {
+            4
+        };
+        let numbers: Vec<usize> = (bytes.chunks_exact(size))
+            .map(|b| b.iter().rev().fold(0, |n, b| 256 * n + usize::from(*b)))
+            .take(accessor["count"].as_u64().expect("a count") as usize)
+            .collect();
+        numbers.as_chunks().0.to_vec()
+    }
+
+    /// The material without a variant, or in one.
+    fn material(&self, variant: Option<&str>) -> &Value {
+        let own = variant.map(|name| {
+            let names = &self.json["extensions"]["KHR_materials_variants"]["variants"];
+            let names = names.as_array().expect("variants");
+            let index = names
+                .iter()
+                .position(|it| it["name"] == name)
+                .expect("the variant");
+            let mappings = &self.primitive["extensions"]["KHR_materials_variants"]["mappings"];
+            let mut mappings = mappings.as_array().expect("mappings").iter();
+            let of = |it: &&Value| {
+                it["variants"]
+                    .as_array()
+                    .expect("list")
+                    .contains(&json!(index))
+            };
+            &mappings.find(of).expect("mapped")["material"]
+        });
+        let index = own.unwrap_or(&self.primitive["material"]);
+        &self.json["materials"][index.as_u64().expect("an index") as usize]
+    }
+
+    /// The picture of a texture info.
+    fn picture(&self, info: &Value) -> image::RgbaImage {
+        let texture = &self.json["textures"][info["index"].as_u64().expect("a texture") as usize];
+        let image = &self.json["images"][texture["source"].as_u64().expect("an image") as usize];
+        let bytes = match image["uri"].as_str() {
+            Some(uri) => STANDARD
+                .decode(uri.split_once(',').expect("a data URI").1)
+                .expect("base64"),
+            None => self.view(&image["bufferView"]).to_vec(),
+        };
+        image::load_from_memory(&bytes)
+            .expect("an image")
+            .into_rgba8()
+    }
+
+    /// For each face its middle in space, and what the base colour shows there.
+    fn shown(&self, variant: Option<&str>) -> Vec<(Vec3, [u8; 3])> {
+        let info = &self.material(variant)["pbrMetallicRoughness"]["baseColorTexture"];
+        let picture = self.picture(info);
+        let set = info["texCoord"].as_u64().unwrap_or(0);
+        let places = self.floats::<2>(&format!("TEXCOORD_{set}"));
+        let positions = self.floats::<3>("POSITION");
+        let middle = |face: [usize; 3]| {
+            let at = face.map(|v| Vec3::from(positions[v].map(f64::from)));
+            let mean = |k: usize| face.map(|v| places[v][k]).iter().sum::<f32>() / 3.0;
+            let texel =
+                |x: f32, side: u32| ((x.rem_euclid(1.0) * side as f32) as u32).min(side - 1);
+            let (x, y) = (
+                texel(mean(0), picture.width()),
+                texel(mean(1), picture.height()),
+            );
+            let [r, g, b, _] = picture.get_pixel(x, y).0;
+            ((at[0] + at[1] + at[2]) / 3.0, [r, g, b])
+        };
+        self.faces().into_iter().map(middle).collect()
+    }
+
+    /// The share of its faces that show the fabric's colour there, within a ΔE of 10.
+    fn share_right(&self, sheet: &TestScan) -> f64 {
+        let shown = self.shown(None);
+        let right = shown.iter().filter(|(at, colour)| {
+            let truth = sheet.truth(unbent(*at)).map(|x| (255.0 * x + 0.5) as u8);
+            ciede2000(lab(truth), lab(*colour)) < 10.0
+        });
+        right.count() as f64 / shown.len() as f64
+    }
+}
+
+fn patched(bytes: &[u8], texture: Option<TextureChoice>) -> Patched {
+    Patched::of(&mended(bytes, &with_texture(texture)).expect("one hole"))
+}
+
+#[test]
+fn on_an_atlas_the_fabric_goes_on() {
+    for kind in [Fabric::Twill, Fabric::Stripes, Fabric::Print] {
+        let sheet = TestScan::new(kind, Layout::Atlas, 128);
+        let bytes = fabric(&sheet);
+        let own = patched(&bytes, None);
+        assert_eq!(own.report.method, "synthesized", "{}", own.report.reason);
+        let share = own.share_right(&sheet);
+        assert!(share > 0.9, "{}: {share}", kind.name());
+        let continued = patched(&bytes, Some(TextureChoice::Continue));
+        assert_eq!(continued.report.method, "continued");
+        let share = continued.share_right(&sheet);
+        assert!(share < 0.6, "{}: continued {share}", kind.name());
+    }
+}
+
+#[test]
+fn where_the_map_goes_on_the_patch_continues_it_and_no_image_is_added() {
+    let sheet = TestScan::new(Fabric::Twill, Layout::OneMap, 128);
+    let own = patched(&fabric(&sheet), None);
+    assert_eq!(own.report.method, "continued");
+    assert!(!own.report.reason.is_empty());
+    assert!(own.share_right(&sheet) > 0.95);
+    // The scan's and the hatch.
+    assert_eq!(own.json["images"].as_array().map(Vec::len), Some(2));
+    let forced = patched(&fabric(&sheet), Some(TextureChoice::Synthesize));
+    assert_eq!(forced.report.method, "synthesized");
+    assert!(forced.share_right(&sheet) > 0.9);
+}
+
+#[test]
+fn where_the_image_has_nothing_under_the_hole_the_patch_gets_its_own() {
+    for kind in [Fabric::Stripes, Fabric::Plaid, Fabric::Print] {
+        let mut sheet = TestScan::new(kind, Layout::OneMap, 128);
+        // Of all that no triangle shows the image has no more than its mean.
+        let middle = sheet.side as f64 / 2.0;
+        for (k, texel) in sheet.texels.iter_mut().enumerate() {
+            let (x, y) = ((k % sheet.side) as f64, (k / sheet.side) as f64);
+            if (x - middle).hypot(y - middle) < 58.0 {
+                *texel = [110, 100, 90, 255];
+            }
+        }
+        let own = patched(&fabric(&sheet), None);
+        assert_eq!(own.report.method, "synthesized", "{}", kind.name());
+    }
+}
+
+#[test]
+fn the_normals_of_a_map_go_on_in_space() {
+    let sheet = TestScan::new(Fabric::Twill, Layout::OneMap, 128);
+    // Everywhere leaning to +u.
+    let (x, z) = (60.0, 112.0);
+    let bytes = edited(&fabric(&sheet), |json| {
+        let image = png(4, &[[188, 128, 240, 255]; 16]);
+        push(&mut json["images"], json!({ "uri": data_uri(&image) }));
+        push(&mut json["textures"], json!({ "source": 1 }));
+        json["materials"][0]["normalTexture"] = json!({ "index": 1 });
+    });
+    let own = patched(&bytes, Some(TextureChoice::Synthesize));
+    assert_eq!(own.report.layers, 2);
+    let info = &own.material(None)["normalTexture"];
+    let picture = own.picture(info);
+    let lean = picture
+        .get_pixel(picture.width() / 2, picture.height() / 2)
+        .0;
+    let lean = [0, 1, 2].map(|k: usize| f64::from(lean[k]) - 128.0);
+    let all = own
+        .floats::<4>("TANGENT")
+        .into_iter()
+        .zip(own.floats::<3>("NORMAL"));
+    let mut seen = 0;
+    for ((tangent, normal), position) in all.zip(own.floats::<3>("POSITION")) {
+        let [tx, ty, tz, w] = tangent.map(f64::from);
+        let (tangent, normal) = (Vec3::new(tx, ty, tz), Vec3::from(normal.map(f64::from)));
+        assert!((tangent.norm() - 1.0).abs() < 1e-5 && tangent.dot(&normal).abs() < 1e-5);
+        let bitangent = normal.cross(&tangent) * w;
+        let found = (tangent * lean[0] + bitangent * lean[1] + normal * lean[2]).normalize();
+        // +u of the sheet goes along its x.
+        let [along, _] = unbent(Vec3::from(position.map(f64::from)));
+        let angle = along / BEND;
+        let (u, n) = (
+            Vec3::new(angle.cos(), 0.0, -angle.sin()),
+            Vec3::new(angle.sin(), 0.0, angle.cos()),
+        );
+        let truth = (u * x + n * z).normalize();
+        assert!(found.dot(&truth) > 0.97, "{found:?} for {truth:?}");
+        seen += 1;
+    }
+    assert!(seen > 100);
+}
+
+#[test]
+fn every_variant_of_the_cloth_has_its_own_image_on_the_patch() {
+    let sheet = TestScan::new(Fabric::Stripes, Layout::Atlas, 64);
+    let swapped: Vec<[u8; 4]> = sheet
+        .texels
+        .iter()
+        .map(|[r, g, b, a]| [*b, *r, *g, *a])
+        .collect();
+    let bytes = edited(&fabric(&sheet), |json| {
+        push(
+            &mut json["images"],
+            json!({ "uri": data_uri(&png(sheet.side, &swapped)) }),
+        );
+        push(&mut json["textures"], json!({ "source": 1 }));
+        let mut other = json["materials"][0].clone();
+        other["pbrMetallicRoughness"]["baseColorTexture"]["index"] = json!(1);
+        push(&mut json["materials"], other);
+        json["extensionsUsed"] = json!(["KHR_materials_variants"]);
+        json["extensions"] =
+            json!({"KHR_materials_variants": {"variants": [{ "name": "swapped" }]}});
+        json["meshes"][0]["primitives"][0]["extensions"] =
+            json!({"KHR_materials_variants": {"mappings": [{ "material": 1, "variants": [0] }]}});
+    });
+    let own = patched(&bytes, None);
+    assert_eq!(
+        (own.report.method.as_str(), own.report.layers),
+        ("synthesized", 2)
+    );
+    let (plain, other) = (own.shown(None), own.shown(Some("swapped")));
+    let near = |a: u8, b: u8| a.abs_diff(b) < 24;
+    let right = (plain.iter().zip(&other))
+        .filter(|((_, [r, g, b]), (_, [x, y, z]))| near(*x, *b) && near(*y, *r) && near(*z, *g))
+        .count();
+    assert!(right * 10 > 9 * plain.len(), "{right} of {}", plain.len());
+    let marked = own.material(Some("Reconstruction marked"));
+    let shown = &marked["pbrMetallicRoughness"]["baseColorTexture"]["index"];
+    let blended = own.material(Some("Reconstruction blended"));
+    assert_eq!(
+        shown,
+        &blended["pbrMetallicRoughness"]["baseColorTexture"]["index"]
+    );
+}
+
+#[test]
+fn materials_that_meet_at_a_hole_go_on_on_their_own_sides() {
+    let sheet = TestScan::new(Fabric::Plain, Layout::OneMap, 128);
+    let bytes = edited(&fabric(&sheet), |json| {
+        // The faces of the sheet's upper half, in rows, get another material: red, without an image.
+        let accessor = json["meshes"][0]["primitives"][0]["indices"]
+            .as_u64()
+            .expect("indices") as usize;
+        let count = json["accessors"][accessor]["count"]
+            .as_u64()
+            .expect("a count");
+        let half = count / 6 * 3;
+        let size = if json["accessors"][accessor]["componentType"] == 5123 {
+            2
+        } else {
+            4
+        };
+        let mut upper = json["accessors"][accessor].clone();
+        json["accessors"][accessor]["count"] = json!(half);
+        upper["count"] = json!(count - half);
+        upper["byteOffset"] = json!(half * size);
+        let accessors = json["accessors"].as_array_mut().expect("accessors");
+        accessors.push(upper);
+        let index = accessors.len() - 1;
+        let mut primitive = json["meshes"][0]["primitives"][0].clone();
+        primitive["indices"] = json!(index);
+        primitive["material"] = json!(1);
+        push(&mut json["meshes"][0]["primitives"], primitive);
+        push(
+            &mut json["materials"],
+            json!({"pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.02, 0.02, 1.0]}}),
+        );
+    });
+    let own = patched(&bytes, None);
+    assert_eq!(own.report.method, "synthesized", "{}", own.report.reason);
+    assert_eq!(
+        own.material(None)["pbrMetallicRoughness"]["baseColorFactor"],
+        json!([1.0, 1.0, 1.0, 1.0])
+    );
+    let is_red = |[r, g, _]: [u8; 3]| r > 150 && g < 90;
+    let mut right = 0;
+    let shown = own.shown(None);
+    for (at, colour) in &shown {
+        let [_, y] = unbent(*at);
+        right += usize::from(is_red(*colour) == (y > 0.0));
+    }
+    assert!(right * 10 > 9 * shown.len(), "{right} of {}", shown.len());
+}
+
+#[test]
+fn a_flat_patch_has_the_mean_colour_and_a_plain_one_none() {
+    let sheet = TestScan::new(Fabric::Stripes, Layout::Atlas, 64);
+    let bytes = fabric(&sheet);
+    let flat = patched(&bytes, Some(TextureChoice::Flat));
+    assert_eq!(flat.report.method, "flat");
+    let material = &flat.material(None)["pbrMetallicRoughness"];
+    assert!(material.get("baseColorTexture").is_none());
+    let factor: Vec<f64> =
+        serde_json::from_value(material["baseColorFactor"].clone()).expect("four");
+    let linear = |x: f32| f64::from(x).powf(2.2);
+    let places = (0..64).map(|k| [f64::from(k) - 32.0, 7.0]);
+    let colours: Vec<[f32; 3]> = places.map(|p| sheet.truth(p)).collect();
+    for k in 0..3 {
+        let mean = colours.iter().map(|c| linear(c[k])).sum::<f64>() / colours.len() as f64;
+        assert!((factor[k] - mean).abs() < 0.15, "{factor:?}: {k} is {mean}");
+    }
+    assert!(flat.primitive["attributes"].get("TEXCOORD_1").is_none());
+    let plain = patched(&bytes, Some(TextureChoice::None));
+    assert_eq!(plain.report.method, "none");
+    assert!(
+        plain.material(None)["pbrMetallicRoughness"]
+            .get("baseColorTexture")
+            .is_none()
+    );
+}
+
+#[test]
+fn images_that_cannot_be_read_leave_the_texture_continued_and_say_so() {
+    let sheet = TestScan::new(Fabric::Stripes, Layout::Atlas, 64);
+    let bytes = fabric(&sheet);
+    // The head of a PNG of 60,000 × 60,000 texels; a header alone.
+    let mut bomb = png(4, &[[0; 4]; 16]);
+    bomb[16..24].copy_from_slice(&[0, 0, 0xEA, 0x60, 0, 0, 0xEA, 0x60]);
+    let crc = crc(&bomb[12..29]);
+    bomb[29..33].copy_from_slice(&crc.to_be_bytes());
+    for (image, why) in [
+        (bomb, "max_image_texels"),
+        (b"\xABKTX 20\xBB\r\n\x1A\n".to_vec(), "PNG, JPEG or WebP"),
+        (png(4, &[[0; 4]; 16])[..60].to_vec(), "/images/0"),
+    ] {
+        let broken = edited(&bytes, |json| {
+            json["images"][0] = json!({ "uri": data_uri(&image) })
+        });
+        let own = patched(&broken, None);
+        assert_eq!(own.report.method, "continued");
+        assert!(own.report.reason.contains(why), "{}", own.report.reason);
+    }
+    let unknown = edited(&bytes, |json| {
+        json["materials"][0]["extensions"] =
+            json!({"ACME_glitter": {"glitterTexture": {"index": 0}}});
+    });
+    let own = patched(&unknown, None);
+    assert!(
+        own.report
+            .reason
+            .contains("/materials/0/extensions/ACME_glitter/glitterTexture")
+    );
+}
+
+/// The checksum of a PNG chunk.
+fn crc(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(u32::MAX, |crc, byte| {
+        (0..8).fold(crc ^ u32::from(*byte), |c, _| {
+            (c >> 1) ^ (0xEDB8_8320 * (c & 1))
+        })
+    })
+}
+
+#[test]
+fn a_patch_with_images_of_its_own_can_be_taken_out_again() {
+    let sheet = TestScan::new(Fabric::Stripes, Layout::Atlas, 64);
+    let bytes = fabric(&sheet);
+    let once = mended(&bytes, &Constraints::default())
+        .expect("one hole")
+        .bytes;
+    assert_eq!(read(&once).parts.len(), 2);
+    let limits = darn_gltf_scan::ScanLimits::default();
+    let stripped = darn_gltf_scan::stripped(once, &limits, darn_budget::Budget::unlimited());
+    let stripped = stripped.expect("a scan").expect("a mended one");
+    assert!(stripped.exact && stripped.bytes == bytes);
+}
+
+#[test]
+fn the_same_request_gives_the_same_bytes() {
+    let sheet = TestScan::new(Fabric::Print, Layout::Atlas, 64);
+    let bytes = fabric(&sheet);
+    let [one, two] = [1, 2].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("threads");
+        pool.install(|| {
+            mended(&bytes, &Constraints::default())
+                .expect("one hole")
+                .bytes
+        })
+    });
+    assert!(one == two);
+}
+
+/// A file with all that a texture can have here: an atlas, a normal map, roughness and occlusion in one image, two variants.
+fn with_everything() -> Vec<u8> {
+    let sheet = TestScan::new(Fabric::Stripes, Layout::Atlas, 64);
+    let map = |texel: &dyn Fn([u8; 4]) -> [u8; 4]| {
+        let texels: Vec<[u8; 4]> = sheet.texels.iter().map(|t| texel(*t)).collect();
+        json!({ "uri": data_uri(&png(sheet.side, &texels)) })
+    };
+    edited(&fabric(&sheet), |json| {
+        push(
+            &mut json["images"],
+            map(&|[r, g, _, _]| [96 + r / 4, 96 + g / 4, 230, 255]),
+        );
+        push(
+            &mut json["images"],
+            map(&|[r, g, _, _]| [255 - r / 8, 128 + g / 4, 0, 255]),
+        );
+        push(&mut json["images"], map(&|[r, g, b, a]| [b, r, g, a]));
+        for source in 1..4 {
+            push(&mut json["textures"], json!({ "source": source }));
+        }
+        let material = &mut json["materials"][0];
+        material["normalTexture"] = json!({ "index": 1, "scale": 0.8 });
+        material["occlusionTexture"] = json!({ "index": 2, "strength": 0.7 });
+        material["pbrMetallicRoughness"]["metallicRoughnessTexture"] = json!({ "index": 2 });
+        let mut other = material.clone();
+        other["name"] = json!("swapped");
+        other["pbrMetallicRoughness"]["baseColorTexture"]["index"] = json!(3);
+        push(&mut json["materials"], other);
+        json["extensionsUsed"] = json!(["KHR_materials_variants"]);
+        json["extensions"] =
+            json!({"KHR_materials_variants": {"variants": [{ "name": "swapped" }]}});
+        json["meshes"][0]["primitives"][0]["extensions"] =
+            json!({"KHR_materials_variants": {"mappings": [{ "material": 1, "variants": [0] }]}});
+    })
+}
+
+/// `scripts/validate` mends the file and loads it with other programs. `DARN_BLESS=1` writes it anew.
+#[test]
+fn the_textured_fixture_is_what_this_code_makes_and_all_its_images_go_on() {
+    let made = with_everything();
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/textured.glb");
+    if std::env::var_os("DARN_BLESS").is_some() {
+        std::fs::write(&path, &made).expect("the fixture is written");
+    }
+    let fixture = std::fs::read(&path).expect("the fixture");
+    // How a PNG is packed is its library's affair.
+    let without_images = |bytes: &[u8]| {
+        let (mut json, bin) = chunks(bytes);
+        json["images"] = Value::Null;
+        (json, bin.to_vec())
+    };
+    assert!(without_images(&fixture) == without_images(&made));
+    let own = patched(&fixture, None);
+    assert_eq!(own.report.method, "synthesized", "{}", own.report.reason);
+    // Base colours of two looks, normals, and one image for roughness and occlusion.
+    assert_eq!(own.report.layers, 4);
+    let material = own.material(None);
+    let index = |info: &Value| info["index"].as_u64().expect("a texture");
+    assert_eq!(
+        index(&material["occlusionTexture"]),
+        index(&material["pbrMetallicRoughness"]["metallicRoughnessTexture"])
+    );
+    assert_eq!(material["occlusionTexture"]["strength"], json!(0.7));
+    assert_eq!(material["normalTexture"]["scale"], json!(0.8));
+}

@@ -1,0 +1,87 @@
+// Loads patched scans as programs do: by glTF Transform and by three.js, in every material variant.
+//
+//   node load.mjs SCAN [SCAN ...]
+//
+// Exit 1 if one cannot be loaded, if a variant chooses a material that cannot be made, if a patch's material has a texture whose texture coordinates
+// are not there, or if it has a normal map of the patch's own and the patch has no tangents. Exit 64 on wrong usage.
+import { readFile } from "node:fs/promises";
+import { NodeIO } from "@gltf-transform/core";
+import { ALL_EXTENSIONS } from "@gltf-transform/extensions";
+import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
+
+const VARIANTS = "KHR_materials_variants";
+
+// What three.js wants of a browser: its images are not looked at here.
+globalThis.self = globalThis;
+globalThis.createImageBitmap = async (blob) => {
+  if (blob.size === 0) throw new Error("an image without bytes");
+  return { width: 1, height: 1, close() {} };
+};
+
+function expect(condition, what) {
+  if (!condition) throw new Error(what);
+}
+
+/** Counts the patches that glTF Transform finds, and looks at their attributes. */
+async function byTransform(path) {
+  const document = await new NodeIO().registerExtensions(ALL_EXTENSIONS).read(path);
+  let patches = 0;
+  for (const mesh of document.getRoot().listMeshes()) {
+    for (const primitive of mesh.listPrimitives()) {
+      if (!primitive.getExtras().darn?.reconstructed) continue;
+      patches += 1;
+      const mapped = primitive.getExtension(VARIANTS)?.listMappings() ?? [];
+      const materials = [primitive.getMaterial(), ...mapped.map((it) => it.getMaterial())];
+      for (const material of materials) {
+        const infos = [material.getBaseColorTextureInfo(), material.getNormalTextureInfo(), material.getEmissiveTextureInfo()];
+        for (const info of infos.filter((it) => it)) {
+          const set = `TEXCOORD_${info.getTexCoord()}`;
+          expect(primitive.getAttribute(set), `${material.getName()} reads ${set}, which is not there`);
+        }
+        const own = material.getNormalTexture()?.getName().startsWith("darn ");
+        expect(!own || primitive.getAttribute("TANGENT"), `${material.getName()} has a normal map, the patch no tangents`);
+      }
+    }
+  }
+  return patches;
+}
+
+/** Loads the scan with three.js and makes every material that a variant chooses. */
+async function byThree(path) {
+  const bytes = await readFile(path);
+  const buffer = bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength);
+  const gltf = await new GLTFLoader().parseAsync(buffer, "");
+  const names = (gltf.parser.json.extensions?.[VARIANTS]?.variants ?? []).map((it) => it.name);
+  let switched = 0;
+  const meshes = [];
+  gltf.scene.traverse((object) => object.isMesh && meshes.push(object));
+  for (const mesh of meshes) {
+    for (const { material, variants } of mesh.userData.gltfExtensions?.[VARIANTS]?.mappings ?? []) {
+      const made = await gltf.parser.getDependency("material", material);
+      expect(made?.isMaterial, `material ${material} cannot be made`);
+      if (made.map) expect(made.map.image, `material ${material} has a texture without an image`);
+      expect(variants.every((it) => it < names.length), `variant ${variants} is not there`);
+      switched += variants.length;
+    }
+  }
+  return { meshes: meshes.length, switched };
+}
+
+const paths = process.argv.slice(2);
+if (paths.length === 0) {
+  console.error("usage: node load.mjs SCAN [SCAN ...]");
+  process.exit(64);
+}
+let failed = 0;
+for (const path of paths) {
+  try {
+    const patches = await byTransform(path);
+    const { meshes, switched } = await byThree(path);
+    expect(patches > 0 && switched > 0, "no patch, or no variant of it");
+    console.log(`${path}: ${meshes} meshes, ${patches} patches, ${switched} choices of variants`);
+  } catch (error) {
+    failed += 1;
+    console.error(`${path}: ${error.message}`);
+  }
+}
+process.exit(failed === 0 ? 0 : 1);
