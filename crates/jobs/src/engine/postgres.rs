@@ -1,0 +1,57 @@
+//! PostgreSQL 15 or newer: a database that many machines share.
+
+use sqlx::{
+    PgPool,
+    postgres::{PgPoolOptions, PgRow},
+};
+
+use super::{
+    Row, Value, schema,
+    value::{bound, decoded},
+};
+use crate::error::JobError;
+
+/// Connections of a process. Statements are short; a thousand processes hold eight thousand, for which PostgreSQL needs a pooler in front.
+const CONNECTIONS: u32 = 8;
+
+/// The oldest version that is tested, as PostgreSQL numbers it.
+const OLDEST: i32 = 150_000;
+
+/// A pool of connections to the server.
+#[derive(Debug)]
+pub(crate) struct Postgres {
+    pool: PgPool,
+}
+
+impl Postgres {
+    /// Connects to the server at the URL and prepares its tables.
+    pub(crate) async fn open(url: &str) -> Result<Self, JobError> {
+        let pool = PgPoolOptions::new()
+            .max_connections(CONNECTIONS)
+            .connect(url)
+            .await?;
+        let (number, found): (i32, String) = sqlx::query_as(
+            "SELECT current_setting('server_version_num')::int, current_setting('server_version')",
+        )
+        .fetch_one(&pool)
+        .await?;
+        if number < OLDEST {
+            return Err(JobError::DatabaseTooOld { found });
+        }
+        schema::prepare_postgres(&pool).await?;
+        Ok(Self { pool })
+    }
+
+    pub(crate) async fn run(&self, sql: &str, args: Vec<Value>) -> Result<Vec<Row>, JobError> {
+        let rows = bound!(sql, args).fetch_all(&self.pool).await?;
+        rows.iter().map(decode).collect()
+    }
+
+    pub(crate) async fn close(&self) {
+        self.pool.close().await;
+    }
+}
+
+fn decode(row: &PgRow) -> Result<Row, JobError> {
+    decoded!(row, int: "INT8", text: "TEXT", id: "UUID")
+}

@@ -1,0 +1,294 @@
+//! The rows of the jobs: one set of statements over both databases.
+//!
+//! Every change is one statement that names the state it expects, so two processes that change a job at the same time cannot both succeed.
+//! What a worker changes is fenced by its [`Lease`]. The files of the jobs are not touched here: a caller writes a file before the
+//! row that names it, and deletes it after the row that names it no more.
+
+mod attempts;
+mod requests;
+mod retention;
+
+use std::{
+    collections::BTreeMap,
+    fmt,
+    path::Path,
+    sync::Arc,
+    time::{Duration, SystemTime, UNIX_EPOCH},
+};
+
+use tokio::sync::Mutex;
+use uuid::Uuid;
+
+use super::{
+    blobs::BlobName,
+    engine::{Engine, Row, Urgency, args, postgres::Postgres, sqlite::Sqlite},
+    error::JobError,
+    job::{
+        ClientCounts, Failure, Job, ListQuery, NewJob, Page, Progress, State, Submission, Submitted,
+    },
+};
+pub use retention::{ExpiredLeases, Freed};
+
+#[cfg(doc)]
+use super::job::Lease;
+
+/// Where the times in rows come from.
+#[derive(Clone, Default)]
+pub enum Clock {
+    /// For PostgreSQL the server, because the clocks of machines differ; for SQLite the system.
+    #[default]
+    OfStore,
+    /// A function that answers with milliseconds since 1970; for tests.
+    Injected(Arc<dyn Fn() -> i64 + Send + Sync>),
+}
+
+impl fmt::Debug for Clock {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::OfStore => "OfStore",
+            Self::Injected(_) => "Injected",
+        })
+    }
+}
+
+/// All jobs.
+#[derive(Debug)]
+pub struct Store {
+    engine: Engine,
+    clock: Clock,
+    lease_ms: i64,
+    /// One claim of this process at a time, so that each sees what those before it took.
+    claims: Mutex<()>,
+}
+
+impl Store {
+    /// The store in a data folder, in SQLite. One process at a time may have it open; the caller sees to that.
+    pub async fn sqlite(folder: &Path, lease: Duration, clock: Clock) -> Result<Self, JobError> {
+        let engine = Engine::Sqlite(Sqlite::open(folder).await?);
+        Ok(Self::new(engine, lease, clock))
+    }
+
+    /// The store on a PostgreSQL server, 15 or newer: `postgres://user:password@host/database`.
+    pub async fn postgres(url: &str, lease: Duration, clock: Clock) -> Result<Self, JobError> {
+        let engine = Engine::Postgres(Postgres::open(url).await?);
+        Ok(Self::new(engine, lease, clock))
+    }
+
+    fn new(engine: Engine, lease: Duration, clock: Clock) -> Self {
+        Self {
+            engine,
+            clock,
+            lease_ms: i64::try_from(lease.as_millis()).unwrap_or(i64::MAX / 4),
+            claims: Mutex::new(()),
+        }
+    }
+
+    /// Closes the connections, after the statements that run.
+    pub async fn close(&self) {
+        self.engine.close().await;
+    }
+
+    /// Writes the row of a new job, which waits from then on, or finds the job of an earlier submission with the same idempotency key.
+    ///
+    /// # Errors
+    /// [`JobError::IdempotencyMismatch`] where the key is that of another payload.
+    pub async fn create(&self, new: &NewJob) -> Result<Submitted, JobError> {
+        let NewJob {
+            id,
+            submission,
+            digest,
+            input,
+            bytes,
+        } = new;
+        let Submission {
+            client,
+            idempotency_key,
+            name,
+            priority,
+            webhook,
+            request,
+        } = submission;
+        let now = self.engine.dialect().now;
+        let insert = format!(
+            "INSERT INTO jobs (id, client, idempotency_key, digest, name, priority, webhook, request, input, bytes,
+                state, version, attempt, created_at, changed_at)
+             VALUES ($2, $3, $4, $5, $6, $7, $8, $9, $10, $11, 'waiting', 1, 0, {now}, {now})
+             ON CONFLICT (client, idempotency_key) WHERE idempotency_key IS NOT NULL DO NOTHING
+             RETURNING *"
+        );
+        loop {
+            let args = args![
+                self.now(),
+                *id,
+                client.as_str(),
+                idempotency_key.clone(),
+                digest.as_str(),
+                name.clone(),
+                *priority,
+                webhook.clone(),
+                request.as_str(),
+                input.as_str(),
+                *bytes,
+            ];
+            if let Some(row) = first(self.engine.write(Urgency::Ordinary, &insert, args).await?) {
+                return Ok(Submitted::New(job(&row)?));
+            }
+            let find = "SELECT * FROM jobs WHERE client = $1 AND idempotency_key = $2";
+            let args = args![client.as_str(), idempotency_key.clone()];
+            if let Some(row) = first(self.engine.read(find, args).await?) {
+                let job = job(&row)?;
+                return if row.some("digest", Row::text)? == *digest {
+                    Ok(Submitted::Repeated(job))
+                } else {
+                    Err(JobError::IdempotencyMismatch { job: job.id })
+                };
+            }
+            // The earlier job was deleted between the two statements: the key is free again.
+        }
+    }
+
+    /// A job.
+    pub async fn get(&self, id: Uuid) -> Result<Job, JobError> {
+        let rows = self
+            .engine
+            .read("SELECT * FROM jobs WHERE id = $1", args![id]);
+        only_job(rows.await?)?.ok_or(JobError::NoSuchJob(id))
+    }
+
+    /// A page of jobs, the newest first.
+    ///
+    /// On PostgreSQL a job can be written a moment after one with a higher number; a list that is read meanwhile lacks it, the next one has it.
+    pub async fn list(&self, query: &ListQuery) -> Result<Page, JobError> {
+        let limit = i64::from(query.limit);
+        let mut args = args![limit.saturating_add(1)];
+        let mut conditions = String::new();
+        let mut condition = |column: &str, value| {
+            args.push(value);
+            let joint = if conditions.is_empty() {
+                "WHERE"
+            } else {
+                "AND"
+            };
+            conditions += &format!(" {joint} {column} ${}", args.len());
+        };
+        if let Some(client) = &query.client {
+            condition("client =", client.as_str().into());
+        }
+        if let Some(state) = query.state {
+            condition("state =", state.word().into());
+        }
+        if let Some(before) = query.before {
+            condition("number <", before.into());
+        }
+        let sql = format!("SELECT * FROM jobs{conditions} ORDER BY number DESC LIMIT $1");
+        let rows = self.engine.read(&sql, args).await?;
+        let mut jobs = rows.iter().map(job).collect::<Result<Vec<_>, _>>()?;
+        let is_more = jobs.len() > query.limit as usize;
+        jobs.truncate(query.limit as usize);
+        let next = jobs.last().map(|job| job.number).filter(|_| is_more);
+        Ok(Page { jobs, next })
+    }
+
+    /// How many jobs are in each state; every state is listed.
+    pub async fn counts(&self) -> Result<BTreeMap<State, i64>, JobError> {
+        // Each part is answered by a partial index alone.
+        let sql = "SELECT 'waiting' AS state, count(*) AS jobs FROM jobs WHERE state = 'waiting'
+            UNION ALL SELECT 'running', count(*) FROM jobs WHERE state = 'running'
+            UNION ALL SELECT state, count(*) FROM jobs WHERE state IN ('done', 'error', 'cancelled') GROUP BY state";
+        let mut counts: BTreeMap<_, _> = State::ALL.map(|state| (state, 0)).into();
+        for row in self.engine.read(sql, args![]).await? {
+            counts.insert(state(&row)?, row.some("jobs", Row::int)?);
+        }
+        Ok(counts)
+    }
+
+    /// How many jobs of a client wait and run.
+    pub async fn client_counts(&self, client: &str) -> Result<ClientCounts, JobError> {
+        let sql = "SELECT state, count(*) AS jobs FROM jobs WHERE client = $1 AND state IN ('waiting', 'running') GROUP BY state";
+        let mut counts = ClientCounts::default();
+        for row in self.engine.read(sql, args![client]).await? {
+            let jobs = row.some("jobs", Row::int)?;
+            match state(&row)? {
+                State::Waiting => counts.waiting = jobs,
+                _ => counts.running = jobs,
+            }
+        }
+        Ok(counts)
+    }
+
+    /// The time for `$1`; nothing where the database's own counts.
+    fn now(&self) -> Option<i64> {
+        match (&self.clock, &self.engine) {
+            (Clock::Injected(clock), _) => Some(clock()),
+            (Clock::OfStore, Engine::Postgres(_)) => None,
+            (Clock::OfStore, Engine::Sqlite(_)) => {
+                let since = SystemTime::now().duration_since(UNIX_EPOCH);
+                Some(since.map_or(0, |since| since.as_millis() as i64))
+            }
+        }
+    }
+}
+
+fn first(rows: Vec<Row>) -> Option<Row> {
+    rows.into_iter().next()
+}
+
+fn only_job(rows: Vec<Row>) -> Result<Option<Job>, JobError> {
+    rows.first().map(job).transpose()
+}
+
+fn state(row: &Row) -> Result<State, JobError> {
+    let word = row.some("state", Row::text)?;
+    word.parse()
+        .map_err(|_| JobError::UnexpectedValue("state".to_owned()))
+}
+
+/// The job of a row with all columns.
+fn job(row: &Row) -> Result<Job, JobError> {
+    let blob = |name| {
+        row.text(name)?
+            .map(|text| BlobName::parse(&text))
+            .transpose()
+    };
+    let progress = match row.text("stage")? {
+        Some(stage) => Some(Progress {
+            stage,
+            hole: row.some("hole", Row::int)?,
+            holes: row.some("holes", Row::int)?,
+        }),
+        None => None,
+    };
+    let failure = match row.text("failure_code")? {
+        Some(code) => Some(Failure {
+            code,
+            message: row.some("failure_message", Row::text)?,
+        }),
+        None => None,
+    };
+    Ok(Job {
+        id: row.some("id", Row::id)?,
+        number: row.some("number", Row::int)?,
+        client: row.some("client", Row::text)?,
+        name: row.text("name")?,
+        priority: row.some("priority", Row::int)?,
+        webhook: row.text("webhook")?,
+        request: row.some("request", Row::text)?,
+        state: state(row)?,
+        version: row.some("version", Row::int)?,
+        attempt: row.some("attempt", Row::int)?,
+        cancel_wanted: row.some("cancel_wanted", Row::int)? != 0,
+        worker: row.text("worker")?,
+        progress,
+        created_at: row.some("created_at", Row::int)?,
+        changed_at: row.some("changed_at", Row::int)?,
+        started_at: row.int("started_at")?,
+        finished_at: row.int("finished_at")?,
+        expired_at: row.int("expired_at")?,
+        input: blob("input")?,
+        result: blob("result")?,
+        report: blob("report")?,
+        bytes: row.some("bytes", Row::int)?,
+        answer: row.text("answer")?,
+        failure,
+    })
+}
