@@ -98,6 +98,7 @@ impl ClaimedJob {
         let [result_name, report_name] = &names;
         let blobs = self.jobs.blobs();
         let stored = async {
+            self.jobs.store().check_room().await?;
             let result = blobs.put(result_name, result).await?;
             let report = blobs.put(report_name, report).await?;
             Ok(result.bytes + report.bytes)

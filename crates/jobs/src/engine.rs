@@ -78,6 +78,14 @@ impl Engine {
         }
     }
 
+    /// Whether there is room for more than the changes that must always be possible. Of a server's disk nothing is known beforehand.
+    pub(crate) async fn has_room(&self) -> bool {
+        match self {
+            Self::Sqlite(engine) => engine.has_room().await,
+            Self::Postgres(_) => true,
+        }
+    }
+
     /// Closes its connections.
     pub(crate) async fn close(&self) {
         match self {

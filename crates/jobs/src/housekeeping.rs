@@ -68,7 +68,6 @@ impl Jobs {
                 break;
             }
         }
-        self.store().restore_reserve().await;
         Ok(jobs)
     }
 

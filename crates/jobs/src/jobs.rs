@@ -150,6 +150,7 @@ impl Jobs {
         submission: Submission,
         input: impl AsyncRead,
     ) -> Result<Submitted, JobError> {
+        self.store.check_room().await?;
         let id = Uuid::new_v4();
         let name = BlobName::input(id);
         let written = self.blobs.put(&name, input).await?;

@@ -88,6 +88,17 @@ impl Store {
         self.engine.close().await;
     }
 
+    /// Fails where the disk has room only for ends, cancellations and deletions: no more files may be written then.
+    ///
+    /// # Errors
+    /// [`JobError::StorageFull`].
+    pub async fn check_room(&self) -> Result<(), JobError> {
+        match self.engine.has_room().await {
+            true => Ok(()),
+            false => Err(JobError::StorageFull),
+        }
+    }
+
     /// Writes the row of a new job, which waits from then on, or finds the job of an earlier submission with the same idempotency key.
     ///
     /// # Errors

@@ -47,12 +47,10 @@ impl Sqlite {
             .max_connections(READERS)
             .connect_with(options.pragma("query_only", "ON"))
             .await?;
-        let reserve = Reserve::new(folder);
-        reserve.restore().await;
         Ok(Self {
             writer,
             readers,
-            reserve,
+            reserve: Reserve::open(folder).await,
         })
     }
 
@@ -79,9 +77,9 @@ impl Sqlite {
         }
     }
 
-    /// Takes the reserve again where it was given up and there is space.
-    pub(crate) async fn restore_reserve(&self) {
-        self.reserve.restore().await;
+    /// Whether there is room for more than the changes that must always be possible.
+    pub(crate) async fn has_room(&self) -> bool {
+        self.reserve.is_held().await
     }
 
     pub(crate) async fn close(&self) {

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{Row, Store, attempts, job};
 use crate::{
     blobs::BlobName,
-    engine::{Engine, Urgency, Value, args},
+    engine::{Urgency, Value, args},
     error::JobError,
     job::{CRASHED, Job, MAX_ATTEMPTS, Retention, State},
 };
@@ -165,12 +165,5 @@ impl Store {
                 ))
             })
             .collect()
-    }
-
-    /// Takes the space for deletions again where a full disk made it necessary to give it up.
-    pub async fn restore_reserve(&self) {
-        if let Engine::Sqlite(engine) = &self.engine {
-            engine.restore_reserve().await;
-        }
     }
 }
