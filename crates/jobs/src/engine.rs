@@ -3,6 +3,7 @@
 //! A statement is one transaction: every change that the store makes is a single statement, so nothing is held open between two of them, and
 //! the work on a job lies in no transaction at all.
 
+mod candidates;
 pub(crate) mod postgres;
 mod schema;
 pub(crate) mod sqlite;
@@ -29,6 +30,8 @@ pub(crate) struct Dialect {
     pub now: &'static str,
     /// What makes two claims at once take two rows.
     pub skip_locked: &'static str,
+    /// Whose turn it is; see [`candidates`].
+    pub candidates: &'static str,
 }
 
 /// Whether a change is worth the space that is held back for a full disk.
@@ -46,10 +49,12 @@ impl Engine {
             Self::Sqlite(_) => Dialect {
                 now: "$1",
                 skip_locked: "",
+                candidates: candidates::SQLITE,
             },
             Self::Postgres(_) => Dialect {
                 now: "coalesce($1, darn_now())",
                 skip_locked: "FOR UPDATE SKIP LOCKED",
+                candidates: candidates::POSTGRES,
             },
         }
     }

@@ -82,8 +82,10 @@ impl JobError {
     }
 }
 
-/// SQLite's primary result code for a full disk (<https://www.sqlite.org/rescode.html#full>).
+/// SQLite's result code for a full disk (<https://www.sqlite.org/rescode.html#full>).
 const SQLITE_FULL: &str = "13";
+/// The one where the index of its log cannot grow, `SQLITE_IOERR_SHMSIZE`.
+const SQLITE_LOG_INDEX_FULL: &str = "4874";
 /// PostgreSQL's code for a full disk (<https://www.postgresql.org/docs/15/errcodes-appendix.html>).
 const POSTGRES_DISK_FULL: &str = "53100";
 
@@ -91,7 +93,7 @@ impl From<sqlx::Error> for JobError {
     fn from(error: sqlx::Error) -> Self {
         let code = error.as_database_error().and_then(|error| error.code());
         match code.as_deref() {
-            Some(SQLITE_FULL | POSTGRES_DISK_FULL) => Self::StorageFull,
+            Some(SQLITE_FULL | SQLITE_LOG_INDEX_FULL | POSTGRES_DISK_FULL) => Self::StorageFull,
             _ => Self::Database(error),
         }
     }

@@ -1,14 +1,14 @@
-//! What has to be done from time to time, by every process; several that do it at once do not disturb each other.
+//! What has to be done from time to time. Every process looks for dead workers; the rest one process does for all. None disturbs another.
 
 use std::time::Duration;
 
-use tokio::time::{Instant, sleep};
+use tokio::time::sleep;
 use tracing::{info, warn};
 
 use super::{
     error::JobError,
     jobs::Jobs,
-    store::{ExpiredLeases, Freed},
+    store::{Chore, ExpiredLeases, Freed},
 };
 
 /// How often leases that ran out are looked for.
@@ -27,19 +27,24 @@ const SWEEP_BATCH: usize = 200;
 impl Jobs {
     /// Does what has to be done from time to time, for ever. What fails is logged, and done the next time.
     pub async fn keep_house(&self) {
-        let mut sweep_at = Instant::now();
-        let mut retain_at = Instant::now();
         loop {
             log(self.expire_leases().await);
-            if retain_at <= Instant::now() {
-                log(self.retain().await);
-                retain_at = Instant::now() + RETENTION_EVERY;
-            }
-            if sweep_at <= Instant::now() {
-                log(self.sweep(ORPHAN_AGE).await);
-                sweep_at = Instant::now() + SWEEP_EVERY;
-            }
+            log(self.do_chore(Chore::Retention).await);
+            log(self.do_chore(Chore::Sweep).await);
             sleep(LEASES_EVERY).await;
+        }
+    }
+
+    /// Does a chore, unless this or another process has done it in its present period.
+    async fn do_chore(&self, chore: Chore) -> Result<usize, JobError> {
+        let period = match chore {
+            Chore::Retention => RETENTION_EVERY,
+            Chore::Sweep => SWEEP_EVERY,
+        };
+        match (self.store().take_chore(chore, period).await?, chore) {
+            (true, Chore::Retention) => self.retain().await,
+            (true, Chore::Sweep) => self.sweep(ORPHAN_AGE).await,
+            (false, _) => Ok(0),
         }
     }
 

@@ -133,7 +133,10 @@ impl Jobs {
         });
         if is_ours_alone {
             jobs.store.expire_leases(ExpiredLeases::OfTheDead).await?;
-            jobs.sweep(Duration::ZERO).await?;
+            // It frees space, and is worth no failure to start.
+            if let Err(error) = jobs.sweep(Duration::ZERO).await {
+                warn!(?error, "files without a job cannot be looked for");
+            }
         }
         Ok(jobs)
     }

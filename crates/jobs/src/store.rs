@@ -27,10 +27,14 @@ use super::{
         ClientCounts, Failure, Job, ListQuery, NewJob, Page, Progress, State, Submission, Submitted,
     },
 };
+pub(crate) use retention::Chore;
 pub use retention::{ExpiredLeases, Freed};
 
 #[cfg(doc)]
 use super::job::Lease;
+
+/// The condition of the indexes of finished jobs, in the words in which they have it.
+const FINISHED: &str = "state IN ('done', 'error', 'cancelled')";
 
 /// Where the times in rows come from.
 #[derive(Clone, Default)]
@@ -78,7 +82,7 @@ impl Store {
         Self {
             engine,
             clock,
-            lease_ms: i64::try_from(lease.as_millis()).unwrap_or(i64::MAX / 4),
+            lease_ms: milliseconds(lease),
             claims: Mutex::new(()),
         }
     }
@@ -172,26 +176,27 @@ impl Store {
     pub async fn list(&self, query: &ListQuery) -> Result<Page, JobError> {
         let limit = i64::from(query.limit);
         let mut args = args![limit.saturating_add(1)];
-        let mut conditions = String::new();
-        let mut condition = |column: &str, value| {
-            args.push(value);
-            let joint = if conditions.is_empty() {
-                "WHERE"
-            } else {
-                "AND"
-            };
-            conditions += &format!(" {joint} {column} ${}", args.len());
-        };
+        let mut conditions = Vec::new();
         if let Some(client) = &query.client {
-            condition("client =", client.as_str().into());
-        }
-        if let Some(state) = query.state {
-            condition("state =", state.word().into());
+            args.push(client.as_str().into());
+            conditions.push(format!("client = ${}", args.len()));
         }
         if let Some(before) = query.before {
-            condition("number <", before.into());
+            args.push(before.into());
+            conditions.push(format!("number < ${}", args.len()));
         }
-        let sql = format!("SELECT * FROM jobs{conditions} ORDER BY number DESC LIMIT $1");
+        if let Some(state) = query.state {
+            // A word in the statement, not an argument: partial indexes are chosen by it.
+            conditions.push(format!("state = '{state}'"));
+            if state.is_finished() {
+                conditions.push(FINISHED.to_owned());
+            }
+        }
+        let conditions = match conditions.is_empty() {
+            true => String::new(),
+            false => format!("WHERE {}", conditions.join(" AND ")),
+        };
+        let sql = format!("SELECT * FROM jobs {conditions} ORDER BY number DESC LIMIT $1");
         let rows = self.engine.read(&sql, args).await?;
         let mut jobs = rows.iter().map(job).collect::<Result<Vec<_>, _>>()?;
         let is_more = jobs.len() > query.limit as usize;
@@ -203,11 +208,13 @@ impl Store {
     /// How many jobs are in each state; every state is listed.
     pub async fn counts(&self) -> Result<BTreeMap<State, i64>, JobError> {
         // Each part is answered by a partial index alone.
-        let sql = "SELECT 'waiting' AS state, count(*) AS jobs FROM jobs WHERE state = 'waiting'
-            UNION ALL SELECT 'running', count(*) FROM jobs WHERE state = 'running'
-            UNION ALL SELECT state, count(*) FROM jobs WHERE state IN ('done', 'error', 'cancelled') GROUP BY state";
+        let sql = format!(
+            "SELECT 'waiting' AS state, count(*) AS jobs FROM jobs WHERE state = 'waiting'
+             UNION ALL SELECT 'running', count(*) FROM jobs WHERE state = 'running'
+             UNION ALL SELECT state, count(*) FROM jobs WHERE {FINISHED} GROUP BY state"
+        );
         let mut counts: BTreeMap<_, _> = State::ALL.map(|state| (state, 0)).into();
-        for row in self.engine.read(sql, args![]).await? {
+        for row in self.engine.read(&sql, args![]).await? {
             counts.insert(state(&row)?, row.some("jobs", Row::int)?);
         }
         Ok(counts)
@@ -215,16 +222,18 @@ impl Store {
 
     /// How many jobs of a client wait and run.
     pub async fn client_counts(&self, client: &str) -> Result<ClientCounts, JobError> {
-        let sql = "SELECT state, count(*) AS jobs FROM jobs WHERE client = $1 AND state IN ('waiting', 'running') GROUP BY state";
-        let mut counts = ClientCounts::default();
-        for row in self.engine.read(sql, args![client]).await? {
-            let jobs = row.some("jobs", Row::int)?;
-            match state(&row)? {
-                State::Waiting => counts.waiting = jobs,
-                _ => counts.running = jobs,
-            }
-        }
-        Ok(counts)
+        let sql = "SELECT
+            (SELECT count(*) FROM jobs WHERE client = $1 AND state = 'waiting') AS waiting,
+            (SELECT count(*) FROM jobs WHERE client = $1 AND state = 'running') AS running";
+        let rows = self.engine.read(sql, args![client]).await?;
+        let count = |name| match rows.first() {
+            Some(row) => row.some(name, Row::int),
+            None => Ok(0),
+        };
+        Ok(ClientCounts {
+            waiting: count("waiting")?,
+            running: count("running")?,
+        })
     }
 
     /// The time for `$1`; nothing where the database's own counts.
@@ -238,6 +247,12 @@ impl Store {
             }
         }
     }
+}
+
+/// Milliseconds of a time, at most a thousand years, which can be added to any time of a row.
+fn milliseconds(time: Duration) -> i64 {
+    const MOST: i64 = 1000 * 366 * 24 * 60 * 60 * 1000;
+    i64::try_from(time.as_millis()).unwrap_or(MOST).min(MOST)
 }
 
 fn first(rows: Vec<Row>) -> Option<Row> {

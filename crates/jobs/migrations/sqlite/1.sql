@@ -39,13 +39,19 @@ CREATE TABLE jobs (
 
 -- A client's key names one job.
 CREATE UNIQUE INDEX jobs_by_key ON jobs (client, idempotency_key) WHERE idempotency_key IS NOT NULL;
--- The claim jumps from client to client, and takes the first of each.
+-- The claim jumps along it from client to client. No other index has waiting jobs of a client together, so that none is taken for it.
 CREATE INDEX jobs_waiting ON jobs (client, priority DESC, number) WHERE state = 'waiting';
 CREATE INDEX jobs_running ON jobs (client) WHERE state = 'running';
 CREATE INDEX jobs_finished ON jobs (finished_at, number, state) WHERE state IN ('done', 'error', 'cancelled');
 -- Lists.
 CREATE INDEX jobs_of_client ON jobs (client, number);
-CREATE INDEX jobs_of_client_by_state ON jobs (client, state, number);
+CREATE INDEX jobs_of_client_finished ON jobs (client, state, number) WHERE state IN ('done', 'error', 'cancelled');
+
+-- Work that one process does for all of them from time to time.
+CREATE TABLE chores (
+    name TEXT PRIMARY KEY,
+    next_at BIGINT NOT NULL
+);
 
 -- Ends of jobs that somebody wants to be told of. A row is written in the transaction that ends the job, so no end is missed and none is
 -- told that did not happen. Its id for the receiver is the job with its version.

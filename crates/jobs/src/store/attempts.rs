@@ -12,30 +12,6 @@ use crate::{
 /// Clients that a claim tries in turn when other processes take their jobs before it.
 const CANDIDATES: i64 = 16;
 
-/// The clients with waiting jobs in the order in which they are served, with the attempts of the first job of each.
-///
-/// A client whose fewest jobs run comes first; among those, the one whose first job has the highest priority; then the one whose first job is oldest.
-/// The statement jumps along the index of waiting jobs from client to client (a skip-scan), so its time grows with the clients that have
-/// waiting jobs and not with the jobs.
-const CANDIDATE_CLIENTS: &str = "
-    WITH RECURSIVE clients (client) AS (
-        SELECT min(client) FROM jobs WHERE state = 'waiting'
-        UNION ALL
-        SELECT (SELECT min(later.client) FROM jobs later WHERE later.state = 'waiting' AND later.client > clients.client)
-        FROM clients WHERE clients.client IS NOT NULL
-    ),
-    heads (client, number) AS (
-        SELECT client, (SELECT job.number FROM jobs job WHERE job.state = 'waiting' AND job.client = clients.client
-            ORDER BY job.priority DESC, job.number LIMIT 1)
-        FROM clients WHERE client IS NOT NULL
-    ),
-    loads (client, running) AS (
-        SELECT client, count(*) FROM jobs WHERE state = 'running' GROUP BY client
-    )
-    SELECT heads.client AS client, job.attempt AS attempt
-    FROM heads JOIN jobs job ON job.number = heads.number LEFT JOIN loads ON loads.client = heads.client
-    ORDER BY coalesce(loads.running, 0), job.priority DESC, job.number LIMIT $1";
-
 /// What every end of an attempt sets.
 const RELEASED: &str = "lease = NULL, lease_until = NULL, stage = NULL, hole = NULL, holes = NULL,
     cancel_wanted = 0, version = version + 1";
@@ -47,7 +23,9 @@ impl Store {
     /// so a client can get as many jobs more than its turn as there are such claims; no job is given out twice.
     pub async fn claim(&self, claimant: &Claimant<'_>) -> Result<Option<Claimed>, JobError> {
         let _turn = self.claims.lock().await;
-        let candidates = self.engine.read(CANDIDATE_CLIENTS, args![CANDIDATES]);
+        let candidates = self
+            .engine
+            .read(self.engine.dialect().candidates, args![CANDIDATES]);
         for candidate in candidates.await? {
             let has_crashed = candidate.some("attempt", Row::int)? > 0;
             if has_crashed && claimant.company == Company::Shared {

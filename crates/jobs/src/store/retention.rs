@@ -1,8 +1,8 @@
 //! What happens by itself: leases run out, finished jobs lose their files and then their rows, files without a row are found.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, time::Duration};
 
-use super::{Row, Store, attempts, job};
+use super::{FINISHED, Row, Store, attempts, job, milliseconds};
 use crate::{
     blobs::BlobName,
     engine::{Urgency, Value, args},
@@ -33,7 +33,36 @@ pub struct Freed {
     pub is_more: bool,
 }
 
+/// Work that one process does for all of them from time to time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Chore {
+    /// Looking through the finished jobs.
+    Retention,
+    /// Looking for files without a row.
+    Sweep,
+}
+
 impl Store {
+    /// Whether this process is to do a chore now. The answer is yes for one process in each period.
+    pub(crate) async fn take_chore(
+        &self,
+        chore: Chore,
+        period: Duration,
+    ) -> Result<bool, JobError> {
+        let name = match chore {
+            Chore::Retention => "retention",
+            Chore::Sweep => "sweep",
+        };
+        let now = self.engine.dialect().now;
+        let sql = format!(
+            "INSERT INTO chores (name, next_at) VALUES ($2, {now} + $3)
+             ON CONFLICT (name) DO UPDATE SET next_at = excluded.next_at WHERE chores.next_at <= {now} RETURNING name"
+        );
+        let args = args![self.now(), name, milliseconds(period)];
+        let rows = self.engine.write(Urgency::EvenWhenFull, &sql, args).await?;
+        Ok(!rows.is_empty())
+    }
+
     /// Ends the attempts whose workers do not renew their leases. Their jobs wait again, are cancelled where a client wanted that, or are
     /// given up after [`MAX_ATTEMPTS`] with the code [`CRASHED`]. Answers with these jobs as they are then.
     pub async fn expire_leases(&self, which: ExpiredLeases) -> Result<Vec<Job>, JobError> {
@@ -66,7 +95,7 @@ impl Store {
         let find = format!(
             "SELECT id, version, input, result, report FROM (
                 SELECT jobs.*, sum(bytes) OVER (ORDER BY finished_at DESC, number DESC) AS kept FROM jobs
-                WHERE state IN ('done', 'error', 'cancelled') AND expired_at IS NULL) finished
+                WHERE {FINISHED} AND expired_at IS NULL) finished
              WHERE finished_at <= {now} - $2 OR kept > $3 - (
                 SELECT coalesce(sum(bytes), 0) FROM jobs WHERE state IN ('waiting', 'running'))
              ORDER BY finished_at, number LIMIT $4"
@@ -86,7 +115,7 @@ impl Store {
         let find = format!(
             "SELECT id, version, input, result, report FROM (
                 SELECT jobs.*, count(*) OVER (ORDER BY finished_at DESC, number DESC) AS place FROM jobs
-                WHERE state IN ('done', 'error', 'cancelled')) finished
+                WHERE {FINISHED}) finished
              WHERE finished_at <= {now} - $2 OR place > $3
              ORDER BY finished_at, number LIMIT $4"
         );

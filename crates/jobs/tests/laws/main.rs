@@ -6,6 +6,7 @@ mod claims;
 mod files;
 #[cfg(target_os = "linux")]
 mod full_disk;
+mod kills;
 mod model;
 mod postgres;
 mod requests;

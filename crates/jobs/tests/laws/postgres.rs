@@ -40,6 +40,7 @@ pub struct Server {
 
 impl Server {
     /// The server of this process. It does not wait for the disk.
+    #[allow(dead_code)] // The example that measures has its own.
     ///
     /// # Panics
     /// Where PostgreSQL is missing or does not start.
