@@ -4,9 +4,11 @@
 FROM rust:1.95.0-slim-bookworm AS build
 WORKDIR /src
 COPY Cargo.toml Cargo.lock rust-toolchain.toml ./
+COPY crates/budget/Cargo.toml crates/budget/
 COPY crates/contract/Cargo.toml crates/contract/
 COPY crates/geometry/Cargo.toml crates/geometry/
 COPY crates/gltf-scan/Cargo.toml crates/gltf-scan/
+COPY crates/jobs/Cargo.toml crates/jobs/
 COPY crates/json/Cargo.toml crates/json/
 COPY crates/lab/Cargo.toml crates/lab/
 COPY crates/mend/Cargo.toml crates/mend/

@@ -1,4 +1,5 @@
-//! The clients with waiting jobs (`client`) in the order in which they are served, at most `$1`, with the attempts of the first job of each (`attempt`).
+//! The clients with waiting jobs (`client`) in the order in which they are served, at most `$1`, with the attempts of the first job of each
+//! (`attempt`).
 //!
 //! A client of whom the fewest jobs run comes first; among those, the one whose first job has the highest priority; then the one whose first job is
 //! oldest.

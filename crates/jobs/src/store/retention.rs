@@ -128,7 +128,8 @@ impl Store {
         Ok(freed)
     }
 
-    /// Makes a change (`$1` the time, `$2` the job, `$3` its version) to each of the jobs found, unless it has changed since it was found: then a client has just touched it, and the next call decides.
+    /// Makes a change (`$1` the time, `$2` the job, `$3` its version) to each of the jobs found. One that has changed since then, because a client
+    /// has just retried or deleted it, is left to the next call.
     async fn free(&self, find: &str, args: Vec<Value>, change: &str) -> Result<Freed, JobError> {
         let found = self.engine.read(find, args).await?;
         let mut freed = Freed {

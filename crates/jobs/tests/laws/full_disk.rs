@@ -8,7 +8,10 @@ use tempfile::TempDir;
 use crate::bench::{claim, failed, product, submission, submit};
 
 /// Mounts the small disk, which nobody else sees, and runs the test below on it.
-const ON_A_SMALL_DISK: &str = r#"mount -t tmpfs -o size=24m darn-full-disk "$1" && cd "$1" && exec "$0" --exact full_disk::on_a_small_disk --ignored --nocapture"#;
+const ON_A_SMALL_DISK: &str = r#"
+mount -t tmpfs -o size=24m darn-full-disk "$1" && cd "$1" &&
+exec "$0" --exact full_disk::on_a_small_disk --ignored --nocapture
+"#;
 
 #[test]
 fn a_full_disk_refuses_what_is_new_and_lets_everything_end() {

@@ -18,8 +18,8 @@ use crate::bench::{Bench, Engine, submission};
 
 /// Times that a process is killed.
 const KILLS: usize = 20;
-/// Jobs that are made in all, more or less.
-const JOBS: usize = 60;
+/// Jobs that are acknowledged at least: half of what the killed processes make when they have the time.
+const FEWEST_JOBS: usize = 30;
 
 /// Where the processes find what to do: in the folder in which they are started.
 const PLACE: &str = "place";
@@ -159,7 +159,7 @@ async fn what_is_acknowledged_survives(engine: Engine) {
     for process in &mut last {
         acknowledged(process, &mut jobs);
     }
-    assert!(jobs.len() >= JOBS / 2, "only {} jobs", jobs.len());
+    assert!(jobs.len() >= FEWEST_JOBS, "only {} jobs", jobs.len());
 
     let store = bench.open().await;
     store.sweep(Duration::ZERO).await.unwrap();
