@@ -1,20 +1,40 @@
-//! Measures how long a claim takes when many jobs wait, on SQLite and on PostgreSQL.
+//! Measures how long a claim takes when many jobs wait, and how many jobs a second go through, on SQLite and on PostgreSQL.
 //!
-//! `cargo run --release -p darn-jobs --example claims` prints a Markdown table. PostgreSQL is started for it, with its durability as installed.
+//! `cargo run --release -p darn-jobs --example claims` prints two Markdown tables. PostgreSQL is started for it, with its durability as installed.
 
 #[path = "../tests/laws/postgres.rs"]
 mod postgres;
 
 use std::{
+    collections::VecDeque,
     error::Error,
+    path::Path,
+    sync::Arc,
     time::{Duration, Instant},
 };
 
-use darn_jobs::{Claimant, Clock, Company, Failure, Outcome, Store};
+use darn_jobs::{Claimant, Clock, Company, Failure, JobError, Outcome, Store};
 use postgres::Server;
 
 /// Claims that are measured in each row of the table.
 const CLAIMS: usize = 300;
+
+const LEASE: Duration = Duration::from_secs(30);
+
+const CLAIMANT: Claimant<'static> = Claimant {
+    worker: "worker",
+    company: Company::Alone,
+};
+
+fn failed() -> Outcome {
+    Outcome::Failed {
+        failure: Failure {
+            code: "no_holes".to_owned(),
+            message: "the scan has no holes".to_owned(),
+        },
+        answer: None,
+    }
+}
 
 /// Makes `$1` waiting jobs of `$2` clients, in turn.
 const FILL_SQLITE: &str = "
@@ -35,19 +55,36 @@ async fn main() -> Result<(), Box<dyn Error>> {
     println!("|---|---|---|---|---|---|");
     for jobs in [20_000, 100_000] {
         for clients in [1, 50, 1000] {
-            let sqlite = on_sqlite(jobs, clients).await?;
-            let postgres = on_postgres(server.database().await, jobs, clients).await?;
+            let folder = tempfile::tempdir()?;
+            let sqlite = measure(&sqlite(folder.path(), jobs, clients).await?).await?;
+            let url = server.database().await;
+            let postgres = measure(&postgres(&url, jobs, clients).await?).await?;
             println!("| {jobs} | {clients} | {sqlite} | {postgres} |");
         }
+    }
+    println!("\n| workers | SQLite, one process: jobs/s | PostgreSQL, a process each: jobs/s |");
+    println!("|---|---|---|");
+    for workers in [1, 2, 4, 8, 16] {
+        let folder = tempfile::tempdir()?;
+        let store = Arc::new(sqlite(folder.path(), 20_000, 50).await?);
+        let sqlite = throughput(vec![store; workers]).await?;
+        let url = server.database().await;
+        let mut stores = vec![Arc::new(postgres(&url, 20_000, 50).await?)];
+        while stores.len() < workers {
+            stores.push(Arc::new(
+                Store::postgres(&url, LEASE, Clock::OfStore).await?,
+            ));
+        }
+        let postgres = throughput(stores).await?;
+        println!("| {workers} | {sqlite:.0} | {postgres:.0} |");
     }
     Ok(())
 }
 
-async fn on_sqlite(jobs: i64, clients: i64) -> Result<String, Box<dyn Error>> {
-    let folder = tempfile::tempdir()?;
-    let store = Store::sqlite(folder.path(), Duration::from_secs(30), Clock::OfStore).await?;
-    let options =
-        sqlx::sqlite::SqliteConnectOptions::new().filename(folder.path().join("jobs.sqlite"));
+/// A store with jobs that wait, in a folder.
+async fn sqlite(folder: &Path, jobs: i64, clients: i64) -> Result<Store, Box<dyn Error>> {
+    let store = Store::sqlite(folder, LEASE, Clock::OfStore).await?;
+    let options = sqlx::sqlite::SqliteConnectOptions::new().filename(folder.join("jobs.sqlite"));
     let pool = sqlx::SqlitePool::connect_with(options).await?;
     sqlx::query(FILL_SQLITE)
         .bind(jobs)
@@ -55,46 +92,62 @@ async fn on_sqlite(jobs: i64, clients: i64) -> Result<String, Box<dyn Error>> {
         .execute(&pool)
         .await?;
     pool.close().await;
-    measure(&store).await
+    Ok(store)
 }
 
-async fn on_postgres(url: String, jobs: i64, clients: i64) -> Result<String, Box<dyn Error>> {
-    let store = Store::postgres(&url, Duration::from_secs(30), Clock::OfStore).await?;
-    let pool = sqlx::PgPool::connect(&url).await?;
+/// A store with jobs that wait, on a server.
+async fn postgres(url: &str, jobs: i64, clients: i64) -> Result<Store, Box<dyn Error>> {
+    let store = Store::postgres(url, LEASE, Clock::OfStore).await?;
+    let pool = sqlx::PgPool::connect(url).await?;
     sqlx::query(FILL_POSTGRES)
         .bind(jobs)
         .bind(clients)
         .execute(&pool)
         .await?;
     pool.close().await;
-    measure(&store).await
+    Ok(store)
+}
+
+/// Jobs a second that as many workers as there are stores claim and end, without any work between.
+async fn throughput(stores: Vec<Arc<Store>>) -> Result<f64, Box<dyn Error>> {
+    const EACH: usize = 100;
+    let start = Instant::now();
+    let work = |store: Arc<Store>| async move {
+        let mut ended = 0;
+        for _ in 0..EACH {
+            // Many claims at once can find all candidates taken for a moment.
+            if let Some(claimed) = store.claim(&CLAIMANT).await? {
+                store.end(claimed.lease, &failed()).await?;
+                ended += 1;
+            }
+        }
+        Ok::<_, JobError>(ended)
+    };
+    let tasks: Vec<_> = stores
+        .into_iter()
+        .map(|store| tokio::spawn(work(store)))
+        .collect();
+    let mut ended = 0;
+    for task in tasks {
+        ended += task.await??;
+    }
+    Ok(f64::from(ended) / start.elapsed().as_secs_f64())
 }
 
 /// Claims jobs and ends them, with eight running at any time.
 async fn measure(store: &Store) -> Result<String, Box<dyn Error>> {
-    let claimant = Claimant {
-        worker: "worker",
-        company: Company::Alone,
-    };
-    let outcome = Outcome::Failed {
-        failure: Failure {
-            code: "no_holes".to_owned(),
-            message: "the scan has no holes".to_owned(),
-        },
-        answer: None,
-    };
-    let mut running = std::collections::VecDeque::new();
+    let mut running = VecDeque::new();
     let (mut claims, mut ends) = (Vec::new(), Vec::new());
     for _ in 0..CLAIMS {
         let start = Instant::now();
-        let claimed = store.claim(&claimant).await?.ok_or("no job waits")?;
+        let claimed = store.claim(&CLAIMANT).await?.ok_or("no job waits")?;
         claims.push(start.elapsed());
         running.push_back(claimed.lease);
         if running.len() > 8
             && let Some(lease) = running.pop_front()
         {
             let start = Instant::now();
-            store.end(lease, &outcome).await?;
+            store.end(lease, &failed()).await?;
             ends.push(start.elapsed());
         }
     }

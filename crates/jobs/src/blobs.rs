@@ -73,15 +73,13 @@ impl Blobs {
     /// after a crash, what [`Self::unnamed`] finds.
     ///
     /// # Errors
-    /// [`JobError::StorageFull`] where the disk is full; [`JobError::File`] where the stream fails, too.
+    /// [`JobError::StorageFull`] where the disk is full, [`JobError::Stream`] where the stream fails.
     pub async fn put(&self, name: &BlobName, content: impl AsyncRead) -> Result<Written, JobError> {
         // Two writers of one name do not meet.
         let temporary = Temporary {
             path: self.incoming.join(format!("{name}-{}", Uuid::new_v4())),
         };
-        let written = copy_to_disk(&temporary.path, content).await;
-        let written =
-            written.map_err(|error| JobError::file(|| format!("cannot write {name}"), error))?;
+        let written = copy_to_disk(&temporary.path, content).await?;
         let whole = self.path(name);
         in_background(move || {
             std::fs::rename(&temporary.path, &whole)?;
@@ -184,25 +182,30 @@ impl Drop for Temporary {
     }
 }
 
-async fn copy_to_disk(path: &Path, content: impl AsyncRead) -> io::Result<Written> {
+async fn copy_to_disk(path: &Path, content: impl AsyncRead) -> Result<Written, JobError> {
+    let failed = |error| JobError::file(|| format!("cannot write {}", path.display()), error);
     let mut content = std::pin::pin!(content);
-    let mut file = File::create_new(path).await?;
+    let mut file = File::create_new(path).await.map_err(failed)?;
     let mut sha256 = Sha256::new();
     let mut bytes = 0;
     let mut chunk = Vec::with_capacity(CHUNK);
     loop {
         chunk.clear();
         let mut part = (&mut content).take(CHUNK as u64);
-        while part.read_buf(&mut chunk).await? > 0 && chunk.len() < CHUNK {}
+        while chunk.len() < CHUNK {
+            if part.read_buf(&mut chunk).await.map_err(JobError::Stream)? == 0 {
+                break;
+            }
+        }
         if chunk.is_empty() {
             break;
         }
         sha256.update(&chunk);
         bytes += chunk.len() as u64;
-        file.write_all(&chunk).await?;
+        file.write_all(&chunk).await.map_err(failed)?;
     }
-    file.flush().await?;
-    file.sync_all().await?;
+    file.flush().await.map_err(failed)?;
+    file.sync_all().await.map_err(failed)?;
     Ok(Written {
         bytes,
         sha256: sha256.finalize().into(),

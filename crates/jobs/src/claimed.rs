@@ -36,6 +36,8 @@ pub struct ClaimedJob {
     lease: Lease,
     attempt: Arc<Attempt>,
     keeper: JoinHandle<()>,
+    /// It may be dropped on a thread that has no runtime.
+    runtime: Handle,
     phase: Phase,
     /// As long as it is there, the job counts as running beside others.
     running: Option<RunningJob>,
@@ -59,6 +61,7 @@ impl ClaimedJob {
             lease,
             attempt,
             keeper: tokio::spawn(keeper),
+            runtime: Handle::current(),
             phase: Phase::Claimed,
             running: Some(running),
         }
@@ -117,9 +120,14 @@ impl ClaimedJob {
         };
         match &ended {
             Ok(_) => self.jobs.discard(&self.job.input).await,
-            // Where the database failed, the end may be written nevertheless: the files stay, and are swept if it was not.
-            Err(JobError::Database(_)) => {}
-            Err(_) => self.jobs.discard(&names).await,
+            Err(
+                JobError::LeaseLost(_)
+                | JobError::StorageFull
+                | JobError::File { .. }
+                | JobError::Stream(_),
+            ) => self.jobs.discard(&names).await,
+            // The end may be written nevertheless: the files stay, and are swept if it was not.
+            Err(_) => {}
         }
         ended
     }
@@ -176,13 +184,11 @@ impl Drop for ClaimedJob {
             return;
         }
         let (jobs, lease) = (Arc::clone(&self.jobs), self.lease);
-        if let Ok(runtime) = Handle::try_current() {
-            runtime.spawn(async move {
-                match jobs.store().end(lease, &Outcome::GivenBack).await {
-                    Ok(_) | Err(JobError::LeaseLost(_)) => jobs.wake(),
-                    Err(error) => warn!(job = %lease.job, ?error, "a job cannot be given back"),
-                }
-            });
-        }
+        self.runtime.spawn(async move {
+            match jobs.store().end(lease, &Outcome::GivenBack).await {
+                Ok(_) | Err(JobError::LeaseLost(_)) => jobs.wake(),
+                Err(error) => warn!(job = %lease.job, ?error, "a job cannot be given back"),
+            }
+        });
     }
 }

@@ -37,6 +37,9 @@ pub enum JobError {
     /// The disk of the database or of the files is full.
     #[error("the storage is full")]
     StorageFull,
+    /// The stream that was to be stored failed, such as a body whose sender is gone; the error is the stream's own.
+    #[error("what was to be stored could not be received")]
+    Stream(#[source] io::Error),
     /// A file that a row names is not there.
     #[error("the file {0} is missing")]
     BlobMissing(BlobName),

@@ -176,6 +176,9 @@ pub struct NewJob {
 }
 
 /// What a client asks for, apart from the input.
+///
+/// PostgreSQL takes no text with a NUL character, and its indexes no client and key of more than about 2,000 bytes together: the caller checks
+/// what clients send.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Submission {
     /// Whose job it is.

@@ -147,7 +147,7 @@ impl Jobs {
     /// submission.
     ///
     /// # Errors
-    /// [`JobError::IdempotencyMismatch`], [`JobError::StorageFull`]; [`JobError::File`] where the stream fails, too. Nothing is left then.
+    /// [`JobError::IdempotencyMismatch`], [`JobError::StorageFull`], [`JobError::Stream`] where the stream fails. Nothing is left then.
     pub async fn submit(
         &self,
         submission: Submission,
@@ -167,9 +167,12 @@ impl Jobs {
         let created = self.store.create(&new).await;
         match &created {
             Ok(Submitted::New(_)) => self.wake(),
+            Ok(Submitted::Repeated(_))
+            | Err(JobError::IdempotencyMismatch { .. } | JobError::StorageFull) => {
+                self.discard([&name]).await;
+            }
             // The row may be there nevertheless: the file stays, and is swept if it is not.
-            Err(JobError::Database(_)) => {}
-            Ok(Submitted::Repeated(_)) | Err(_) => self.discard([&name]).await,
+            Err(_) => {}
         }
         created
     }

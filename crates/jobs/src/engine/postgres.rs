@@ -1,9 +1,12 @@
 //! PostgreSQL 15 or newer: a database that many machines share.
 
+use std::time::Duration;
+
 use sqlx::{
     PgPool,
     postgres::{PgPoolOptions, PgRow},
 };
+use tokio::time::timeout;
 
 use super::{
     Row, Value, schema,
@@ -13,6 +16,9 @@ use crate::error::JobError;
 
 /// Connections of a process. Statements are short; a thousand processes hold eight thousand, for which PostgreSQL needs a pooler in front.
 const CONNECTIONS: u32 = 8;
+
+/// After which time an answer is not waited for any more: the server or the way to it is gone, and the system may take a quarter of an hour to say so.
+const PATIENCE: Duration = Duration::from_secs(20);
 
 /// The oldest version that is tested, as PostgreSQL numbers it.
 const OLDEST: i32 = 150_000;
@@ -43,7 +49,8 @@ impl Postgres {
     }
 
     pub(crate) async fn run(&self, sql: &str, args: Vec<Value>) -> Result<Vec<Row>, JobError> {
-        let rows = bound!(sql, args).fetch_all(&self.pool).await?;
+        let answer = timeout(PATIENCE, bound!(sql, args).fetch_all(&self.pool)).await;
+        let rows = answer.map_err(|late| sqlx::Error::Io(late.into()))??;
         rows.iter().map(decode).collect()
     }
 

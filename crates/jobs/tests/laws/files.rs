@@ -139,7 +139,7 @@ law! {
     async fn a_submission_that_breaks_off_leaves_nothing(bench: Bench) {
         let jobs = bench.open().await;
         let broken = jobs.submit(submission("client"), Broken(1 << 20)).await;
-        assert!(matches!(broken, Err(JobError::File { .. })), "{broken:?}");
+        assert!(matches!(broken, Err(JobError::Stream(_))), "{broken:?}");
         let dropped = tokio::time::timeout(Duration::from_millis(50), jobs.submit(submission("client"), Stuck));
         dropped.await.unwrap_err();
         assert_eq!(bench.files(), [""; 0]);
