@@ -62,7 +62,9 @@ async fn main() -> Result<(), Box<dyn Error>> {
             println!("| {jobs} | {clients} | {sqlite} | {postgres} |");
         }
     }
-    println!("\n| workers | SQLite, one process: jobs/s | PostgreSQL, connections of their own: jobs/s |");
+    println!(
+        "\n| workers | SQLite, one process: jobs/s | PostgreSQL, connections of their own: jobs/s |"
+    );
     println!("|---|---|---|");
     for workers in [1, 2, 4, 8, 16] {
         let folder = tempfile::tempdir()?;

@@ -14,7 +14,7 @@ use tracing::{info, warn};
 use super::{
     error::JobError,
     job::{Lease, Progress, Signal},
-    jobs::Jobs,
+    jobs::{Changes, Jobs},
 };
 
 /// How often progress is written at most. More often would only cost syncs of the disk.
@@ -61,16 +61,25 @@ impl Attempt {
             .unwrap_or_else(PoisonError::into_inner)
             .take()
     }
+
+    /// Keeps progress that could not be written, unless there is newer one.
+    fn put_back(&self, progress: Progress) {
+        self.progress
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .get_or_insert(progress);
+    }
 }
 
 /// Renews the lease, writes progress and hears of cancellation, until the lease is lost or this is dropped.
 ///
 /// A cancellation by this process is heard of at once, one by another machine at the next renewal. While the database cannot be reached, the
 /// work goes on: if nobody takes the lease meanwhile, nothing is lost.
-pub(crate) async fn keep(jobs: Arc<Jobs>, lease: Lease, attempt: Arc<Attempt>) {
+///
+/// `stops` has been listening since before the job was claimed, so that no cancellation is missed.
+pub(crate) async fn keep(jobs: Arc<Jobs>, lease: Lease, attempt: Arc<Attempt>, mut stops: Changes) {
     let mut ticks = interval(PROGRESS_EVERY.min(jobs.settings().renewal));
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    let mut stops = jobs.stops();
     let mut renewed_at = Instant::now();
     loop {
         let is_told = tokio::select! {
@@ -81,8 +90,9 @@ pub(crate) async fn keep(jobs: Arc<Jobs>, lease: Lease, attempt: Arc<Attempt>) {
         let signal = match attempt.take_progress() {
             Some(progress) => {
                 let signal = jobs.store().progress(lease, &progress).await;
-                if signal.is_ok() {
-                    jobs.announce(lease.job);
+                match signal {
+                    Ok(_) => jobs.announce(lease.job),
+                    Err(_) => attempt.put_back(progress),
                 }
                 signal
             }

@@ -17,7 +17,7 @@ use super::{
     company::RunningJob,
     error::JobError,
     job::{Claimed, Failure, Job, Lease, Outcome, Product},
-    jobs::Jobs,
+    jobs::{Changes, Jobs},
 };
 
 /// How long the end of an attempt is tried to be written while the database fails.
@@ -51,10 +51,15 @@ enum Phase {
 }
 
 impl ClaimedJob {
-    pub(crate) fn new(jobs: Arc<Jobs>, claimed: Claimed, running: RunningJob) -> Self {
+    pub(crate) fn new(
+        jobs: Arc<Jobs>,
+        claimed: Claimed,
+        running: RunningJob,
+        stops: Changes,
+    ) -> Self {
         let Claimed { job, lease } = claimed;
         let attempt = Arc::new(Attempt::default());
-        let keeper = attempt::keep(Arc::clone(&jobs), lease, Arc::clone(&attempt));
+        let keeper = attempt::keep(Arc::clone(&jobs), lease, Arc::clone(&attempt), stops);
         Self {
             jobs,
             job,

@@ -298,12 +298,14 @@ impl Jobs {
                 worker: &worker,
                 company,
             };
+            let stops = jobs.stops();
             let Some(claimed) = jobs.store.claim(&claimant).await? else {
                 return Ok(None);
             };
             let running = jobs.running.start(&claimed.job);
             jobs.announce(claimed.job.id);
-            Ok(Some(ClaimedJob::new(Arc::clone(&jobs), claimed, running)))
+            let jobs = Arc::clone(&jobs);
+            Ok(Some(ClaimedJob::new(jobs, claimed, running, stops)))
         });
         match claim.await {
             Ok(claimed) => claimed,
@@ -385,7 +387,7 @@ impl Jobs {
     }
 
     /// The jobs that this process cancels and deletes from now on.
-    pub(crate) fn stops(&self) -> Changes {
+    fn stops(&self) -> Changes {
         Changes(self.stopped.subscribe())
     }
 }

@@ -2,10 +2,11 @@
 
 use std::time::Duration;
 
-use darn_jobs::{Failure, JobError, Progress, State, StopReason, Submission};
+use darn_jobs::{Failure, JobError, Place, Progress, State, StopReason, Submission};
+use sqlx::{Connection, PgConnection};
 use tokio::time::{sleep, timeout};
 
-use crate::bench::{Bench, law, submission, submit};
+use crate::bench::{Bench, Engine, law, submission, submit};
 
 const SOON: Duration = Duration::from_secs(10);
 
@@ -31,9 +32,9 @@ law! {
         claimed.input().await.unwrap();
         assert_eq!(claimed.job().worker.as_deref(), Some("worker"));
         for _ in 0..4 {
-            // Half a lease at a time, with time for a renewal after each.
-            bench.clock.advance(15_000);
-            sleep(Duration::from_millis(400)).await;
+            // A third of a lease at a time, with time for some renewals after each.
+            bench.clock.advance(10_000);
+            sleep(Duration::from_millis(500)).await;
             assert_eq!(jobs.expire_leases().await.unwrap(), 0);
         }
         claimed.finish(&b"mended"[..], &b"{}"[..], "{}".to_owned()).await.unwrap();
@@ -49,30 +50,27 @@ law! {
         claimed.input().await.unwrap();
         let running = jobs.changed_since(submitted.id, submitted.version).await.unwrap();
         assert_eq!((running.state, running.version), (State::Running, 2));
-        let news = tokio::spawn({
-            let jobs = jobs.clone();
-            async move {
-                let told = jobs.changed_since(running.id, running.version).await.unwrap();
-                let ended = jobs.changed_since(told.id, told.version).await.unwrap();
-                let deleted = jobs.changed_since(ended.id, ended.version).await;
-                (told, ended, deleted)
-            }
-        });
+        let news_since = |version| {
+            let (jobs, id) = (jobs.clone(), submitted.id);
+            let news = tokio::spawn(async move { jobs.changed_since(id, version).await });
+            async { timeout(SOON, news).await.unwrap().unwrap() }
+        };
         let progress = |hole| Progress { stage: "patch".to_owned(), hole, holes: 900 };
+        let news = news_since(running.version);
         // Far more often than it is written: the last one counts.
         for hole in 0..=900 {
             claimed.attempt().report(progress(hole));
         }
-        until(async || jobs.get(submitted.id).await.unwrap().progress == Some(progress(900))).await;
-        sleep(Duration::from_millis(200)).await;
+        let told = news.await.unwrap();
+        assert_eq!((told.progress, told.version), (Some(progress(900)), 3));
+        let news = news_since(told.version);
         let failure = Failure { code: "no_holes".to_owned(), message: "none".to_owned() };
         claimed.fail(failure.clone(), Some("[]".to_owned())).await.unwrap();
-        sleep(Duration::from_millis(200)).await;
-        jobs.delete(submitted.id).await.unwrap();
-        let (told, ended, deleted) = timeout(SOON, news).await.unwrap().unwrap();
-        assert_eq!((told.progress, told.version), (Some(progress(900)), 3));
+        let ended = news.await.unwrap();
         assert_eq!((ended.state, ended.failure, ended.progress), (State::Error, Some(failure), None));
-        assert!(matches!(deleted, Err(JobError::NoSuchJob(_))));
+        let news = news_since(ended.version);
+        jobs.delete(submitted.id).await.unwrap();
+        assert!(matches!(news.await, Err(JobError::NoSuchJob(_))));
     }
 }
 
@@ -88,7 +86,6 @@ law! {
             claimed.input().await.unwrap();
             let attempt = claimed.attempt();
             assert_eq!(attempt.stop_reason(), None);
-            sleep(Duration::from_millis(50)).await;
             match reason {
                 StopReason::Cancelled => drop(jobs.cancel(id).await.unwrap()),
                 StopReason::LeaseLost => jobs.delete(id).await.unwrap(),
@@ -163,5 +160,27 @@ law! {
         for id in neighbours {
             assert_eq!(jobs.get(id).await.unwrap().state, State::Done);
         }
+    }
+}
+
+#[tokio::test]
+async fn connections_to_postgres_may_break() {
+    const BREAK: &str = "SELECT pg_terminate_backend(pid) FROM pg_stat_activity
+        WHERE datname = current_database() AND pid <> pg_backend_pid()";
+    let bench = Bench::new(Engine::Postgres).await;
+    let Place::Shared { url, .. } = &bench.place else {
+        unreachable!("it is on PostgreSQL")
+    };
+    let jobs = bench.open().await;
+    let mut other = PgConnection::connect(url).await.unwrap();
+    for _ in 0..3 {
+        submit(&jobs, "client").await;
+        let mut claimed = timeout(SOON, jobs.next_job("worker")).await.unwrap();
+        claimed.input().await.unwrap();
+        sqlx::query(BREAK).execute(&mut other).await.unwrap();
+        let result = claimed.finish(&b"mended"[..], &b"{}"[..], "{}".to_owned());
+        let job = result.await.unwrap();
+        sqlx::query(BREAK).execute(&mut other).await.unwrap();
+        assert_eq!(jobs.get(job.id).await.unwrap().state, State::Done);
     }
 }
