@@ -17,7 +17,7 @@ use crate::error::JobError;
 /// Connections of a process. Statements are short; a thousand processes hold eight thousand, for which PostgreSQL needs a pooler in front.
 const CONNECTIONS: u32 = 8;
 
-/// After which time an answer is not waited for any more: the server or the way to it is gone, and the system may take a quarter of an hour to say so.
+/// How long an answer is waited for. After that the server, or the way to it, is gone; the system may take a quarter of an hour to say so.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// The oldest version that is tested, as PostgreSQL numbers it.
