@@ -13,18 +13,31 @@ mount -t tmpfs -o size=24m darn-full-disk "$1" && cd "$1" &&
 exec "$0" --exact full_disk::on_a_small_disk --ignored --nocapture
 "#;
 
+/// How a namespace is made in which a file system can be mounted: by anybody, or by root where others may not.
+const NAMESPACES: [&[&str]; 2] = [&["--user", "--map-root-user", "--mount"], &["--mount"]];
+
+fn in_namespace(arguments: &[&str]) -> Command {
+    let mut command = Command::new("unshare");
+    command.args(arguments).args(["sh", "-c"]);
+    command
+}
+
+/// Containers may forbid mounts; the law is then not looked at, and the output says so.
 #[test]
 fn a_full_disk_refuses_what_is_new_and_lets_everything_end() {
     let folder = TempDir::new().unwrap();
-    let ran = Command::new("unshare")
-        .args([
-            "--user",
-            "--map-root-user",
-            "--mount",
-            "sh",
-            "-c",
-            ON_A_SMALL_DISK,
-        ])
+    let may_mount = |arguments: &&&[&str]| {
+        let mut trial = in_namespace(arguments);
+        trial.args([r#"mount -t tmpfs -o size=1m darn-trial "$0""#]);
+        let ran = trial.arg(folder.path()).output();
+        ran.is_ok_and(|ran| ran.status.success())
+    };
+    let Some(namespace) = NAMESPACES.iter().find(may_mount) else {
+        eprintln!("not looked at: this system lets nobody mount a file system in a namespace");
+        return;
+    };
+    let ran = in_namespace(namespace)
+        .arg(ON_A_SMALL_DISK)
         .arg(std::env::current_exe().unwrap())
         .arg(folder.path())
         .output()
@@ -36,7 +49,7 @@ fn a_full_disk_refuses_what_is_new_and_lets_everything_end() {
     );
     assert!(
         ran.status.success() && output.contains("1 passed"),
-        "either the law is broken, or this system lets nobody mount a file system in a namespace:\n{output}"
+        "the law is broken:\n{output}"
     );
 }
 
