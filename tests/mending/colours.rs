@@ -1,6 +1,7 @@
 //! The colour of patches: sheets of known fabrics, mended as files, and what a viewer would show where the hole was.
 
 use std::io::Cursor;
+use std::sync::Arc;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -10,7 +11,7 @@ use darn_geometry::mesh::{TriMesh, Vec3};
 use darn_texture::testset::{Fabric, Layout, TestScan, ciede2000, lab};
 use serde_json::{Value, json};
 
-use super::cloth::{mended, packed, read};
+use super::cloth::{mended, mender, packed, read};
 
 /// Texels to a unit of the scene.
 const SCALE: f64 = 100.0;
@@ -243,6 +244,28 @@ fn on_an_atlas_the_fabric_goes_on() {
         let share = continued.share_right(&sheet);
         assert!(share < 0.6, "{}: continued {share}", kind.name());
     }
+}
+
+#[test]
+fn the_patches_of_a_session_come_in_their_own_colours() {
+    let sheet = TestScan::new(Fabric::Twill, Layout::Atlas, 128);
+    let opening = Constraints::default();
+    let never = darn_budget::Budget::unlimited();
+    let scan = read(&fabric(&sheet));
+    let session = darn_mend::ScanSession::open(scan, &opening, Arc::clone(mender()), never);
+    let session = session.expect("one hole");
+    let (glb, _) = session.call(never).glb(&opening).expect("a patch");
+    let (json, bin) = chunks(&glb);
+    let shown = Patched {
+        primitive: json["meshes"][0]["primitives"][0].clone(),
+        bin: bin.to_vec(),
+        report: v1::TextureReport::default(),
+        json,
+    };
+    let share = shown.share_right(&sheet);
+    assert!(share > 0.9, "{share}");
+    let whole = session.call(never).mended(&opening).expect("a scan").bytes;
+    assert!(whole == mended(&fabric(&sheet), &opening).expect("one hole").bytes);
 }
 
 #[test]

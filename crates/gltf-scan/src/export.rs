@@ -1,4 +1,4 @@
-//! Writes meshes that have no scan as a GLB: one node, mesh and primitive for each, one material for all.
+//! Writes meshes that have no scan as a GLB: one node, mesh and primitive for each, one material for all that have no texture.
 //! For simulated sheets, patches without their scan, examples and tests.
 
 use serde_json::{Value, json};
@@ -6,6 +6,9 @@ use serde_json::{Value, json};
 use super::buffers::BufferTarget;
 use super::container::{float_bytes, pack_glb};
 use super::error::ScanError;
+use super::patch_appearance::OwnTexture;
+use super::patch_images::ImageSheet;
+use super::texture_slots::TextureKind;
 
 /// A mesh to write. `positions` and `normals` are `[vertices]`, `texcoords` too or empty.
 #[derive(Debug, Clone, Copy)]
@@ -35,25 +38,75 @@ pub fn glb(mesh: &NewMesh) -> Result<Vec<u8>, ScanError> {
 /// # Errors
 /// [`ScanError::InvalidPatch`] when the file would exceed the 4 GiB of a GLB.
 pub fn meshes(meshes: &[NewMesh]) -> Result<Vec<u8>, ScanError> {
+    let plain = meshes.iter().map(|mesh| TexturedMesh {
+        mesh: *mesh,
+        texture: None,
+    });
+    textured_meshes(&plain.collect::<Vec<_>>())
+}
+
+/// A mesh to write, in the base colour of images of its own if it has them; its texture coordinates lie in them.
+#[derive(Debug, Clone, Copy)]
+pub struct TexturedMesh<'a> {
+    /// The mesh.
+    pub mesh: NewMesh<'a>,
+    /// The images.
+    pub texture: Option<&'a OwnTexture>,
+}
+
+/// Several meshes as [`meshes`] writes them, those with a texture in a material of their own.
+///
+/// # Errors
+/// [`ScanError::InvalidPatch`] when the file would exceed the 4 GiB of a GLB.
+pub fn textured_meshes(meshes: &[TexturedMesh]) -> Result<Vec<u8>, ScanError> {
     let mut buffer = BufferBuilder::default();
-    let primitives: Vec<Value> = meshes.iter().map(|mesh| buffer.primitive(mesh)).collect();
-    let named = meshes.iter().zip(primitives);
-    let each = |k: usize| json!({"mesh": k, "name": meshes[k].name});
-    let document = json!({
+    let mut materials = vec![json!({
+        "name": "cloth",
+        "doubleSided": true,
+        "pbrMetallicRoughness": {"baseColorFactor": [0.72, 0.6, 0.42, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.9},
+    })];
+    let (mut images, mut textures) = (Vec::new(), Vec::new());
+    let mut primitives: Vec<Value> = Vec::new();
+    for TexturedMesh { mesh, texture } in meshes {
+        let mut primitive = buffer.primitive(mesh);
+        let base = texture.and_then(|own| Some((own, own.base_colour()?)));
+        if let Some((own, layer)) = base {
+            let png = ImageSheet::of(&[own]).png(layer, TextureKind::BaseColour)?;
+            images.push(json!({"bufferView": buffer.view(&png, None), "mimeType": "image/png"}));
+            textures.push(json!({"source": images.len() - 1}));
+            primitive["material"] = materials.len().into();
+            materials.push(json!({
+                "name": "darn reconstruction",
+                "doubleSided": true,
+                "pbrMetallicRoughness": {
+                    "baseColorTexture": {"index": textures.len() - 1},
+                    "metallicFactor": 0.0,
+                    "roughnessFactor": 0.9,
+                },
+            }));
+        }
+        primitives.push(primitive);
+    }
+    let names = || meshes.iter().map(|it| it.mesh.name);
+    let named = names().zip(primitives);
+    let nodes = names()
+        .enumerate()
+        .map(|(k, name)| json!({"mesh": k, "name": name}));
+    let mut document = json!({
         "asset": {"version": "2.0", "generator": concat!("darn ", env!("CARGO_PKG_VERSION"))},
         "scene": 0,
         "scenes": [{"nodes": (0..meshes.len()).collect::<Vec<_>>()}],
-        "nodes": (0..meshes.len()).map(each).collect::<Vec<_>>(),
-        "meshes": named.map(|(m, p)| json!({"name": m.name, "primitives": [p]})).collect::<Vec<_>>(),
-        "materials": [{
-            "name": "cloth",
-            "doubleSided": true,
-            "pbrMetallicRoughness": {"baseColorFactor": [0.72, 0.6, 0.42, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.9},
-        }],
+        "nodes": nodes.collect::<Vec<_>>(),
+        "meshes": named.map(|(name, p)| json!({"name": name, "primitives": [p]})).collect::<Vec<_>>(),
+        "materials": materials,
         "accessors": buffer.accessors,
         "bufferViews": buffer.views,
         "buffers": [{"byteLength": buffer.bin.len()}],
     });
+    if !images.is_empty() {
+        document["textures"] = textures.into();
+        document["images"] = images.into();
+    }
     pack_glb(document.to_string().as_bytes(), Some(&buffer.bin), &[]).ok_or_else(|| {
         ScanError::InvalidPatch {
             patch: 0,
@@ -115,14 +168,22 @@ impl BufferBuilder {
 
     /// Appends bytes with a buffer view and an accessor of their own; returns the accessor's index.
     fn push(&mut self, bytes: Vec<u8>, target: BufferTarget, mut accessor: Value) -> usize {
-        self.views.push(
-            json!({"buffer": 0, "byteOffset": self.bin.len(), "byteLength": bytes.len(), "target": target as u32}),
-        );
-        self.bin.extend_from_slice(&bytes);
-        self.bin.resize(self.bin.len().next_multiple_of(4), 0);
-        accessor["bufferView"] = (self.views.len() - 1).into();
+        accessor["bufferView"] = self.view(&bytes, Some(target)).into();
         self.accessors.push(accessor);
         self.accessors.len() - 1
+    }
+
+    /// Appends bytes with a buffer view of their own; returns the view's index.
+    fn view(&mut self, bytes: &[u8], target: Option<BufferTarget>) -> usize {
+        let mut view =
+            json!({"buffer": 0, "byteOffset": self.bin.len(), "byteLength": bytes.len()});
+        if let Some(target) = target {
+            view["target"] = json!(target as u32);
+        }
+        self.views.push(view);
+        self.bin.extend_from_slice(bytes);
+        self.bin.resize(self.bin.len().next_multiple_of(4), 0);
+        self.views.len() - 1
     }
 }
 

@@ -51,7 +51,7 @@ impl PatchAppearance {
     }
 
     /// The images, if it has its own.
-    pub(super) fn own(&self) -> Option<&OwnTexture> {
+    pub fn own(&self) -> Option<&OwnTexture> {
         match self {
             Self::Own(own) => Some(own),
             _ => None,
@@ -60,6 +60,16 @@ impl PatchAppearance {
 }
 
 impl OwnTexture {
+    /// The layer of the base colour, without a variant.
+    pub(super) fn base_colour(&self) -> Option<usize> {
+        let choice = self.look.choice(None)?;
+        let is_base = |used: &&LayerUse| {
+            let slot = SLOTS.get(used.slot);
+            slot.is_some_and(|slot| slot.kind == TextureKind::BaseColour)
+        };
+        choice.layers.iter().find(is_base).map(|used| used.layer)
+    }
+
     /// Whether a material has a texture that needs tangents.
     pub(super) fn has_normals(&self) -> bool {
         let mut layers = self.look.layers.iter();

@@ -114,7 +114,7 @@ impl<'p> ImageSheet<'p> {
     }
 
     /// One layer as a PNG; without alpha where all of it is opaque.
-    fn png(&self, layer: usize, kind: TextureKind) -> Result<Vec<u8>, ScanError> {
+    pub fn png(&self, layer: usize, kind: TextureKind) -> Result<Vec<u8>, ScanError> {
         let empty = match kind {
             TextureKind::Normal => [128, 128, 255, 255],
             _ => [128, 128, 128, 255],

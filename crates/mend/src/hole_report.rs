@@ -83,7 +83,7 @@ impl<'a> PatchDraft<'a> {
             notes,
             anchors: kept.anchors,
             edits: kept.edits,
-            doubts: doubts(&patch),
+            doubts: doubts(&patch, hole.region()),
             left_faces: hole.charted().map_or(0, |hole| hole.left_faces) as u32,
             cut: welded.cuts.report(hole.id()),
         };

@@ -71,7 +71,7 @@ impl PreparedHole {
             return Ok(self);
         };
         let doubts = match hole.unedited(inpainter, call) {
-            Ok(unedited) => doubts(&unedited.patch),
+            Ok(unedited) => doubts(&unedited.patch, &hole.region),
             Err(MendError::Patch { source, .. }) => vec![source.to_string()],
             Err(error) => return Err(error),
         };
@@ -83,7 +83,7 @@ impl PreparedHole {
             doubts.join("; ")
         );
         match FairHole::new(welded, hole.id, reason, call) {
-            Ok(fair) if crate::doubts::doubts(&fair.fair.patch).is_empty() => {
+            Ok(fair) if crate::doubts::doubts(&fair.fair.patch, &fair.region).is_empty() => {
                 Ok(PreparedHole::Fair(Box::new(fair)))
             }
             Err(MendError::Exhausted(exhausted)) => Err(exhausted.into()),
@@ -197,6 +197,30 @@ mod tests {
             .find(|l| l.kind == kind)
             .expect("a loop");
         PreparedHole::new(&welded, rim.id.0, mender().into()).expect("a hole")
+    }
+
+    #[test]
+    fn a_patch_that_is_crumpled_where_its_cloth_is_not_is_doubted() {
+        let PreparedHole::Charted(hole) = prepared(&holed_sheet(24, 0.15), LoopKind::Hole) else {
+            panic!("flat cloth has a chart");
+        };
+        let inpainter = Inpainter::choose(&mender().networks, None, None).unwrap();
+        let sound = hole.unedited(&inpainter, mender().into()).unwrap();
+        assert_eq!(doubts(&sound.patch, &hole.region), Vec::<String>::new());
+        let mut crumpled = sound.patch.clone();
+        let rim = crumpled.rim.len();
+        let inner = crumpled.positions[rim..].iter_mut().enumerate();
+        inner.for_each(|(k, p)| p.z += [0.0, 0.012, -0.012][k * k % 3]);
+        let found = doubts(&crumpled, &hole.region);
+        assert!(
+            found.iter().any(|doubt| doubt.contains("crumpled")),
+            "{found:?}"
+        );
+        // Cloth that is as rough around it may go on so.
+        let mut rough = hole.region.clone();
+        let all = rough.mesh.positions.iter_mut().enumerate();
+        all.for_each(|(k, p)| p.z += [0.0, 0.012, -0.012][k * k % 3]);
+        assert_eq!(doubts(&crumpled, &rough), Vec::<String>::new());
     }
 
     #[test]

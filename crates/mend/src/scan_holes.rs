@@ -26,7 +26,7 @@ use crate::welded_scan::WeldedScan;
 use darn_budget::Budget;
 use darn_contract::port::Mended;
 use darn_contract::{Constraints, FieldError, HoleSelector, Search, TextureChoice, v1};
-use darn_gltf_scan::{PatchPrimitive, Scan};
+use darn_gltf_scan::Scan;
 
 /// A scan's holes, prepared.
 pub struct ScanHoles {
@@ -56,6 +56,16 @@ pub struct FilledScan<'a> {
     pub inpainter: Inpainter<'a>,
     /// Milliseconds of filling them, without preparing them.
     pub fill_ms: f64,
+}
+
+/// The patches of a request, and how long they took.
+pub struct ColouredPatches {
+    /// In order of id.
+    pub patches: Vec<ColouredPatch>,
+    /// Milliseconds of continuing the scan's attributes.
+    pub dressed_ms: f64,
+    /// Milliseconds of their textures.
+    pub texture_ms: f64,
 }
 
 impl ScanHoles {
@@ -253,29 +263,19 @@ impl ScanHoles {
         texture: Option<TextureChoice>,
         call: Call,
     ) -> Result<Mended, MendError> {
+        let ColouredPatches {
+            patches,
+            dressed_ms,
+            texture_ms,
+        } = self.coloured(scan, &filled, texture, call)?;
         let started = Instant::now();
-        let source = self.patch_source(scan, &filled, call.budget);
-        let dressed = (filled.holes.par_iter())
-            .map(|hole| Ok(source.dressed(hole)?))
-            .collect::<Result<Vec<_>, MendError>>()?;
-        let dressed_ms = milliseconds(started);
-        let started = Instant::now();
-        let colouring = Colouring {
-            source,
-            choice: texture,
-            settings: call.mender.limits.texture,
-            scan_limits: &call.mender.scan_limits,
-        };
-        let coloured = colouring.coloured(&filled.holes, dressed)?;
-        let texture_ms = milliseconds(started);
-        let started = Instant::now();
-        let mut additions = Vec::with_capacity(coloured.len());
-        let mut told = Vec::with_capacity(coloured.len());
+        let mut additions = Vec::with_capacity(patches.len());
+        let mut told = Vec::with_capacity(patches.len());
         for ColouredPatch {
             primitive,
             report,
             texture_ms,
-        } in coloured
+        } in patches
         {
             additions.push(primitive);
             told.push((report, texture_ms));
@@ -302,20 +302,35 @@ impl ScanHoles {
         })
     }
 
-    /// The patches in the scan's terms, with its texture coordinates and colours continued.
+    /// The patches in the scan's terms, coloured as asked for.
     ///
     /// # Errors
     /// `Exhausted`.
-    pub fn continued(
+    pub fn coloured(
         &self,
         scan: &Scan,
         filled: &FilledScan,
-        budget: &Budget,
-    ) -> Result<Vec<PatchPrimitive>, MendError> {
-        let source = self.patch_source(scan, filled, budget);
-        let each = filled.holes.par_iter();
-        let all = each.map(|hole| Ok(source.dressed(hole)?.primitive));
-        all.collect()
+        texture: Option<TextureChoice>,
+        call: Call,
+    ) -> Result<ColouredPatches, MendError> {
+        let started = Instant::now();
+        let source = self.patch_source(scan, filled, call.budget);
+        let dressed = (filled.holes.par_iter())
+            .map(|hole| Ok(source.dressed(hole)?))
+            .collect::<Result<Vec<_>, MendError>>()?;
+        let dressed_ms = milliseconds(started);
+        let started = Instant::now();
+        let colouring = Colouring {
+            source,
+            choice: texture,
+            settings: call.mender.limits.texture,
+            scan_limits: &call.mender.scan_limits,
+        };
+        Ok(ColouredPatches {
+            patches: colouring.coloured(&filled.holes, dressed)?,
+            dressed_ms,
+            texture_ms: milliseconds(started),
+        })
     }
 
     fn patch_source<'a>(

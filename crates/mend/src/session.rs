@@ -13,7 +13,7 @@ use darn_budget::Budget;
 use darn_contract::port::Mended;
 use darn_contract::{Constraints, FieldError, Search, v1};
 use darn_geometry::mesh::{Vec2, Vec3};
-use darn_gltf_scan::export::{NewMesh, meshes};
+use darn_gltf_scan::export::{NewMesh, TexturedMesh, textured_meshes};
 use darn_gltf_scan::{PatchPoint, PatchPrimitive, Scan};
 
 /// A scan with its holes prepared, the mender that fills them, and the description of both.
@@ -140,15 +140,20 @@ impl<'a> SessionCall<'a> {
         Ok(mended)
     }
 
-    /// The patches alone, as a GLB with one mesh for each hole, in order of id.
+    /// The patches alone, as a GLB with one mesh for each hole, in order of id, each in the base colour of its own images if it has them.
     ///
     /// # Errors
     /// As [`mend`](crate::mend).
     pub fn glb(&self, constraints: &Constraints) -> Result<(Vec<u8>, v1::Report), MendError> {
         let filled = self.filled(constraints)?;
-        let additions =
-            (self.session.holes).continued(&self.session.scan, &filled, self.call.budget)?;
-        let bytes = glb(&self.session.scan, &additions)?;
+        let coloured = (self.session.holes).coloured(
+            &self.session.scan,
+            &filled,
+            constraints.texture,
+            self.call,
+        )?;
+        let additions = coloured.patches.into_iter().map(|patch| patch.primitive);
+        let bytes = glb(&self.session.scan, &additions.collect::<Vec<_>>())?;
         Ok((bytes, self.session.report(filled)))
     }
 
@@ -238,7 +243,7 @@ fn hole_bytes(hole: &v1::SessionHole) -> usize {
     8 * numbers + 4 * (hole.hole_cells.len() + hole.patch_faces.len()) + hole.chart_png.len()
 }
 
-/// Patches as a GLB: a mesh for each, in scene space, with its first texture coordinates.
+/// Patches as a GLB: a mesh for each, in scene space, with its first texture coordinates and its own base colour.
 fn glb(scan: &Scan, additions: &[PatchPrimitive]) -> Result<Vec<u8>, MendError> {
     let place = |point: &PatchPoint| -> [f32; 3] {
         match point {
@@ -260,16 +265,19 @@ fn glb(scan: &Scan, additions: &[PatchPrimitive]) -> Result<Vec<u8>, MendError> 
                 .collect()
         })
         .collect();
-    let fresh: Vec<NewMesh> = (additions.iter().zip(positions.iter().zip(&normals)))
-        .map(|(addition, (positions, normals))| NewMesh {
-            name: &addition.name,
-            positions,
-            normals,
-            texcoords: addition.texcoords.first().map_or(&[], Vec::as_slice),
-            faces: &addition.faces,
+    let fresh: Vec<TexturedMesh> = (additions.iter().zip(positions.iter().zip(&normals)))
+        .map(|(addition, (positions, normals))| TexturedMesh {
+            mesh: NewMesh {
+                name: &addition.name,
+                positions,
+                normals,
+                texcoords: addition.texcoords.first().map_or(&[], Vec::as_slice),
+                faces: &addition.faces,
+            },
+            texture: addition.appearance.own(),
         })
         .collect();
-    Ok(meshes(&fresh)?)
+    Ok(textured_meshes(&fresh)?)
 }
 
 #[cfg(test)]

@@ -5,24 +5,35 @@ import type { Patch } from '../model/scan_session.js';
 import {
   BufferAttribute,
   BufferGeometry,
+  DoubleSide,
   GLTFLoader,
   type Intersection,
   type Material,
   Mesh,
   MeshStandardMaterial,
+  type Texture,
   Triangle,
   Vector3,
 } from '../vendor.js';
 import { vectors } from './scan_model.js';
 
+/** The surface of a patch, and the image of its own if it has one. */
+export interface Surface {
+  readonly geometry: BufferGeometry;
+  readonly image: Texture | null;
+}
+
 /** The surfaces of a dressing's GLB, in order of hole id. */
-export async function readSurfaces(glb: ArrayBuffer): Promise<BufferGeometry[]> {
+export async function readSurfaces(glb: ArrayBuffer): Promise<Surface[]> {
   const { scene } = await new GLTFLoader().parseAsync(glb, '');
   scene.updateMatrixWorld(true);
-  const surfaces: BufferGeometry[] = [];
+  const surfaces: Surface[] = [];
   scene.traverse((object) => {
     if (object instanceof Mesh) {
-      surfaces.push((object.geometry as BufferGeometry).applyMatrix4(object.matrixWorld));
+      surfaces.push({
+        geometry: (object.geometry as BufferGeometry).applyMatrix4(object.matrixWorld),
+        image: (object.material as MeshStandardMaterial).map,
+      });
     }
   });
   return surfaces;
@@ -31,6 +42,8 @@ export async function readSurfaces(glb: ArrayBuffer): Promise<BufferGeometry[]> 
 /** A patch's mesh. */
 export class PatchModel {
   readonly mesh: Mesh<BufferGeometry, Material>;
+  /** The image of the patch's own, if it has one. */
+  readonly image: Texture | null;
   private readonly corners: Uint32Array;
   private readonly rim: number;
   /** The normals of the first state: those at the rim agree with the scan's and stay. */
@@ -44,9 +57,10 @@ export class PatchModel {
    */
   constructor(
     private patch: Patch,
-    surface: BufferGeometry,
+    { geometry: surface, image }: Surface,
     material: Material,
   ) {
+    this.image = image;
     const id = patch.hole.id ?? 0;
     const first = patch.dressing.positions.get(id) ?? patch.positions;
     const position = surface.getAttribute('position');
@@ -120,6 +134,7 @@ export class PatchModel {
   }
 
   dispose(): void {
+    this.image?.dispose();
     this.mesh.geometry.dispose();
   }
 
@@ -179,7 +194,14 @@ function vertexNormals(positions: Float32Array, faces: readonly number[]): Float
 /** New cloth in a colour of its own. */
 export const TINT = 0xf0a35e;
 
-/** The material of a patch that continues the scan's: its own copy, so that the scan's can be exchanged. */
-export function blendedMaterial(scan: Material | undefined): Material {
+/**
+ * The material of a patch that continues the scan's: its own copy, so that the scan's can be exchanged. With an image of the patch's own it has that
+ * and no other: the patch's texture coordinates lie in it.
+ */
+export function blendedMaterial(scan: Material | undefined, image: Texture | null): Material {
+  if (image !== null) {
+    const { roughness = 0.9, metalness = 0 } = (scan as MeshStandardMaterial | undefined) ?? {};
+    return new MeshStandardMaterial({ map: image, roughness, metalness, side: DoubleSide });
+  }
   return scan?.clone() ?? new MeshStandardMaterial({ color: 0xb9bec6 });
 }

@@ -5,7 +5,6 @@ import { byKind } from '../model/loops.js';
 import type { Patch } from '../model/scan_session.js';
 import {
   Box3,
-  type BufferGeometry,
   DirectionalLight,
   HemisphereLight,
   type Material,
@@ -15,13 +14,14 @@ import {
   Raycaster,
   Scene,
   Sphere,
+  type Texture,
   Vector2,
   Vector3,
   WebGLRenderer,
 } from '../vendor.js';
 import { linesOfLoops } from './boundary.js';
 import { Marks } from './marks.js';
-import { PatchModel, TINT, blendedMaterial, readSurfaces } from './patch_model.js';
+import { PatchModel, type Surface, TINT, blendedMaterial, readSurfaces } from './patch_model.js';
 import { Rims } from './rims.js';
 import { ScanModel, type Shading, plainMaterial } from './scan_model.js';
 
@@ -157,7 +157,7 @@ export class Viewer {
     if (before.shading !== this.look.shading || before.tinted !== this.look.tinted) {
       for (const patch of this.patches) {
         patch.mesh.material.dispose();
-        patch.mesh.material = this.materialOf(patch.shown);
+        patch.mesh.material = this.materialOf(patch.shown, patch.image);
       }
     }
     this.draw();
@@ -272,7 +272,7 @@ export class Viewer {
     this.raycaster.setFromCamera(device, this.camera);
   }
 
-  private materialOf({ hole }: Patch): Material {
+  private materialOf({ hole }: Patch, image: Texture | null): Material {
     const { shading, tinted } = this.look;
     if (tinted) {
       return plainMaterial(TINT, shading);
@@ -280,7 +280,8 @@ export class Viewer {
     if (shading !== 'textured') {
       return plainMaterial(0xb9bec6, shading);
     }
-    return blendedMaterial(this.scan?.materialNear(new Vector3().fromArray(hole.rimPositions ?? [0, 0, 0])));
+    const scan = this.scan?.materialNear(new Vector3().fromArray(hole.rimPositions ?? [0, 0, 0]));
+    return blendedMaterial(scan, image);
   }
 
   /** Near and far planes that hold the whole scan, whatever its unit. */
@@ -326,12 +327,12 @@ export class Viewer {
     return patches.length === this.patches.length && patches.every(same);
   }
 
-  private replacePatches(surfaces: readonly BufferGeometry[]): void {
+  private replacePatches(surfaces: readonly Surface[]): void {
     this.clearPatches();
     this.wanted.forEach((patch, i) => {
       const surface = surfaces[i];
       if (surface !== undefined) {
-        const model = new PatchModel(patch, surface, this.materialOf(patch));
+        const model = new PatchModel(patch, surface, this.materialOf(patch, surface.image));
         this.patches.push(model);
         this.scene.add(model.mesh);
       }

@@ -1,8 +1,8 @@
 //! Measures the quality of a patch for the report.
 
 use super::Patch;
-use crate::mesh::TriMesh;
 use crate::mesh::region::Region;
+use crate::mesh::{TriMesh, Vec3};
 
 /// Measurements of a patch.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,15 +25,13 @@ pub struct Quality {
 pub fn measure(patch: &Patch, region: &Region) -> Quality {
     let (mut edges, mut sum, mut most) = (0usize, 0.0, 0.0f64);
     let mut area = 0.0;
-    let mut angles = vec![0.0; patch.positions.len()];
     for face in &patch.faces {
         let p = face.map(|v| patch.positions[v as usize]);
         let flat = face.map(|v| patch.flat.get(v as usize));
         area += 0.5 * (p[1] - p[0]).cross(&(p[2] - p[0])).norm();
         for k in 0..3 {
-            let (next, last) = ((k + 1) % 3, (k + 2) % 3);
-            let (to_next, to_last) = (p[next] - p[k], p[last] - p[k]);
-            angles[face[k] as usize] += to_next.cross(&to_last).norm().atan2(to_next.dot(&to_last));
+            let next = (k + 1) % 3;
+            let to_next = p[next] - p[k];
             // The scan sets the length of an edge between two rim vertices.
             let is_inner = face[k].max(face[next]) as usize >= patch.rim.len();
             if let (true, Some(to), Some(from)) = (is_inner, flat[next], flat[k]) {
@@ -44,21 +42,50 @@ pub fn measure(patch: &Patch, region: &Region) -> Quality {
             }
         }
     }
-    let inner = &angles[patch.rim.len()..];
-    let defects: f64 = inner
-        .iter()
-        .map(|a| (std::f64::consts::TAU - a).abs())
-        .sum();
     let gap =
         |(k, v): (usize, &u32)| (patch.positions[k] - region.mesh.positions[*v as usize]).norm();
     Quality {
         area,
         stretch_mean: if edges == 0 { 1.0 } else { sum / edges as f64 },
         stretch_max: if edges == 0 { 1.0 } else { most },
-        gaussian_curvature: defects / inner.len().max(1) as f64,
+        gaussian_curvature: gaussian_curvature(patch),
         seam_gap: patch.rim.iter().enumerate().map(gap).fold(0.0, f64::max),
         self_intersections: patch.crossings,
     }
+}
+
+/// Mean size of the angle defect of a patch's inner vertices, radians; 0 without any.
+pub fn gaussian_curvature(patch: &Patch) -> f64 {
+    let inner = |v: usize| v >= patch.rim.len();
+    mean_defect(&patch.positions, &patch.faces, &inner)
+}
+
+/// The same of the cloth around a hole: of the vertices on none of its boundaries.
+pub fn region_curvature(region: &Region) -> f64 {
+    let mut on_boundary = vec![false; region.mesh.positions.len()];
+    let inside = region.holes.iter().chain(&region.islands).flatten();
+    let loops = inside.chain(&region.rim).chain(&region.outer);
+    loops.for_each(|v| on_boundary[*v as usize] = true);
+    mean_defect(&region.mesh.positions, &region.mesh.faces, &|v| {
+        !on_boundary[v]
+    })
+}
+
+fn mean_defect(positions: &[Vec3], faces: &[[u32; 3]], counts: &dyn Fn(usize) -> bool) -> f64 {
+    let mut angles = vec![0.0; positions.len()];
+    for face in faces {
+        let p = face.map(|v| positions[v as usize]);
+        for k in 0..3 {
+            let (to_next, to_last) = (p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]);
+            angles[face[k] as usize] += to_next.cross(&to_last).norm().atan2(to_next.dot(&to_last));
+        }
+    }
+    let (mut sum, mut count) = (0.0, 0usize);
+    for (_, angle) in angles.iter().enumerate().filter(|(v, _)| counts(*v)) {
+        sum += (std::f64::consts::TAU - angle).abs();
+        count += 1;
+    }
+    sum / count.max(1) as f64
 }
 
 /// The region's mesh with the patch appended: the patch's inner vertices and its faces come last.
