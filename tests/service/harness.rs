@@ -50,7 +50,7 @@ impl Service {
             .grpc
             .as_ref()
             .map(|socket| socket.local_addr().unwrap());
-        let app = App::start(&settings, fake.clone()).unwrap();
+        let app = App::start(&settings, fake.clone()).await.unwrap();
         let stop = CancellationToken::new();
         let ended = tokio::spawn(serve(sockets, app.clone(), stop.clone(), settings.drain));
         let service = Self {

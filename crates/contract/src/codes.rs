@@ -106,6 +106,25 @@ codes! {
     /// The sessions in use leave no room for another.
     SESSIONS_FULL = "sessions_full", 503, Unavailable;
 
+    // Jobs.
+
+    /// The service was started without a data folder and keeps no jobs.
+    JOBS_NOT_KEPT = "jobs_not_kept", 404, NotFound;
+    /// The job's id is unknown, or the job is forgotten.
+    NO_SUCH_JOB = "no_such_job", 404, NotFound;
+    /// The job has no result yet.
+    JOB_UNFINISHED = "job_unfinished", 409, FailedPrecondition;
+    /// The job's state does not allow what was asked.
+    JOB_WRONG_STATE = "job_wrong_state", 409, FailedPrecondition;
+    /// The job's files were deleted because of their age or the space they took.
+    JOB_EXPIRED = "job_expired", 410, NotFound;
+    /// The idempotency key was used with another payload.
+    IDEMPOTENCY_MISMATCH = "idempotency_mismatch", 422, InvalidArgument;
+    /// Every attempt at the job ended its process.
+    JOB_CRASHED_WORKER = "job_crashed_worker", 500, Internal;
+    /// The disk on which jobs are kept is full.
+    STORAGE_FULL = "storage_full", 507, Unavailable;
+
     // The service's own state.
 
     /// An error of the service itself; its details are logged, never sent.

@@ -325,17 +325,20 @@ impl Jobs {
                     self.wake();
                     return claimed;
                 }
-                Ok(None) => {
-                    tokio::select! {
-                        () = self.waiting.notified() => {}
-                        () = sleep(self.settings.poll) => {}
-                    }
-                }
+                Ok(None) => self.look_again().await,
                 Err(error) => {
                     warn!(?error, "no job can be claimed");
                     sleep(self.settings.poll).await;
                 }
             }
+        }
+    }
+
+    /// Waits until a job may wait that [`Self::claim`] has not seen: until this process makes one wait, at most a second.
+    pub async fn look_again(&self) {
+        tokio::select! {
+            () = self.waiting.notified() => {}
+            () = sleep(self.settings.poll) => {}
         }
     }
 

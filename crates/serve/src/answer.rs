@@ -10,7 +10,7 @@ use std::{
     task::{Context, Poll, Waker, ready},
 };
 
-use axum::{body::Body, http::HeaderMap};
+use axum::{body::Body, http::HeaderMap, response::Response};
 use bytes::{Buf, Bytes};
 use hyper::{
     body::{Frame, SizeHint},
@@ -20,7 +20,7 @@ use tokio::{
     select,
     sync::Notify,
     task_local,
-    time::{Instant, sleep_until},
+    time::{Duration, Instant, sleep_until},
 };
 use tracing::debug;
 
@@ -30,6 +30,13 @@ use super::pace::{Pace, PaceLimits};
 const PIECE_BYTES: usize = 64 << 10;
 /// Most pieces of an answer on their way.
 const MAX_PIECES: usize = 4;
+/// Longest time that a live answer may take.
+const LIVE_ANSWER: Duration = Duration::from_secs(24 * 60 * 60);
+
+/// Marks, as an extension, an answer that is written as things happen. As a whole it may take a day; each of its pieces must be taken as others.
+#[derive(Debug, Clone, Copy)]
+pub struct LiveAnswer;
+
 /// Most bytes of an answer that HTTP/2 buffers.
 pub const MAX_BUFFERED_BYTES: usize = MAX_PIECES * PIECE_BYTES;
 
@@ -123,9 +130,9 @@ impl Reader {
         }
     }
 
-    /// A new answer begins.
-    fn begin(&self) {
-        self.state().end = Instant::now() + self.limits.whole();
+    /// A new answer begins, which must have been taken after this time.
+    fn begin(&self, whole: Duration) {
+        self.state().end = Instant::now() + whole;
     }
 
     fn sent(&self) {
@@ -209,10 +216,18 @@ pub struct AnswerBody {
 
 impl AnswerBody {
     /// The body of an answer that the current task sends. Outside of [`while_read`] nobody looks how it is taken.
-    pub fn new(body: Body, limits: PaceLimits) -> Self {
+    pub fn new(answer: Response, limits: PaceLimits) -> Response<Self> {
+        let whole = match answer.extensions().get::<LiveAnswer>() {
+            Some(LiveAnswer) => LIVE_ANSWER,
+            None => limits.whole(),
+        };
+        answer.map(|body| Self::of(body, limits, whole))
+    }
+
+    fn of(body: Body, limits: PaceLimits, whole: Duration) -> Self {
         let reader = READER.try_with(Arc::clone);
         let reader = reader.unwrap_or_else(|_| Arc::new(Reader::new(limits)));
-        reader.begin();
+        reader.begin(whole);
         Self {
             body,
             rest: Bytes::new(),

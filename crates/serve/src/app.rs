@@ -1,7 +1,6 @@
-//! What HTTP and gRPC share: the mender, the worker pool, the sessions, the limits, the metrics, and the service's state.
+//! What HTTP and gRPC share: the mender, the worker pool, the sessions, the jobs, the limits, the metrics, and the service's state.
 
 use std::{
-    io,
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering::Relaxed},
@@ -10,20 +9,23 @@ use std::{
 };
 
 use axum::extract::Request;
+use darn_jobs::{Jobs, Place};
 use tokio::time::{Instant, timeout_at};
+use tokio_util::sync::CancellationToken;
 use tracing::error;
 use uuid::Uuid;
 
 use super::{
+    ServeError,
     client_address::ClientAddress,
     config::ServeArgs,
     connection_table::{ConnectionLimits, ConnectionTable},
     error::RequestError,
     fair_queue::Client,
-    job::{JobOrder, PoolError},
     kept_session::KeptSession,
     pace::PaceLimits,
-    pool::Pool,
+    pool::{JobTurn, Pool},
+    pool_task::{PoolError, TaskOrder},
     session_store::{SessionLimits, SessionStore},
     telemetry::Metrics,
     uploads::{BodySize, Sharing, UploadRefusal, UploadSlot, Uploads},
@@ -38,8 +40,10 @@ const WORK_PER_BYTE: u64 = 40_000;
 const MEMORY_PER_BYTE: usize = 150;
 /// Bytes of memory that any request may hold: a small scan may have large images.
 const LEAST_MEMORY: usize = 1 << 30;
+/// Longest time that a durable job may wait for its worker and be mended: nobody waits for its answer, and its work is limited by its size.
+const DURABLE_DEADLINE: Duration = Duration::from_secs(60 * 60);
 /// What a job costs beside the bytes of its scan, in bytes: it orders small jobs.
-const JOB_COST: u64 = 100_000;
+const TASK_COST: u64 = 100_000;
 
 /// The running service, apart from its sockets.
 pub struct App {
@@ -55,6 +59,10 @@ pub struct App {
     pub connections: Arc<ConnectionTable>,
     /// Scans kept for editing.
     pub sessions: Arc<SessionStore>,
+    /// The durable jobs; `None` without a data folder.
+    pub jobs: Option<Arc<Jobs>>,
+    /// Cancelled when the service begins to shut down.
+    pub stopping: CancellationToken,
     pool: Pool,
     /// Whether clients are told apart by their address.
     sharing: Sharing,
@@ -86,7 +94,7 @@ impl UploadPermit {
 
 /// The size of a request, by which its cost is estimated and limited.
 #[derive(Debug, Clone, Copy)]
-struct JobSize {
+struct TaskSize {
     /// Whom it is for.
     client: Client,
     /// Bytes of its scan.
@@ -145,12 +153,26 @@ impl std::fmt::Debug for App {
 }
 
 impl App {
-    /// Starts the workers; binds no socket.
+    /// Opens the jobs and starts the workers; binds no socket.
     ///
     /// # Errors
-    /// When a thread cannot be started.
-    pub fn start(settings: &ServeArgs, mender: Arc<dyn Mender>) -> io::Result<Arc<Self>> {
-        let metrics = Metrics::new().map_err(io::Error::other)?;
+    /// The data folder cannot be used, or a thread cannot be started.
+    pub async fn start(
+        settings: &ServeArgs,
+        mender: Arc<dyn Mender>,
+    ) -> Result<Arc<Self>, ServeError> {
+        let jobs = match &settings.data {
+            Some(folder) => {
+                let place = Place::Folder(folder.clone());
+                let opened = Jobs::open(&place, darn_jobs::Settings::default()).await;
+                Some(opened.map_err(|source| ServeError::Jobs {
+                    folder: folder.clone(),
+                    source,
+                })?)
+            }
+            None => None,
+        };
+        let metrics = Metrics::new().map_err(std::io::Error::other)?;
         let pool = Pool::start(settings.workers(), settings.queue, metrics.pool())?;
         let session_limits = SessionLimits {
             idle: settings.session_idle,
@@ -181,6 +203,8 @@ impl App {
             allow_origin: settings.allow_origin.clone(),
             editor: !settings.no_editor,
             sessions,
+            jobs,
+            stopping: CancellationToken::new(),
             pool,
             sharing,
             uploads: Uploads::new(settings.uploads(), sharing),
@@ -196,12 +220,12 @@ impl App {
     /// The mender's refusal or the pool's error.
     pub async fn warm_up(&self) -> Result<(), RequestError> {
         let deadline = Deadline::after(Duration::from_secs(3600));
-        let size = JobSize {
+        let size = TaskSize {
             client: None,
             bytes: 0,
         };
         // The warm-up takes no budget, so its size limits nothing.
-        self.run_job(None, size, deadline, |mender, _| mender.warm_up())
+        self.run_task(None, size, deadline, |mender, _| mender.warm_up())
             .await?;
         self.warm.store(true, Relaxed);
         Ok(())
@@ -229,6 +253,27 @@ impl App {
         size: BodySize,
         client: Option<ClientAddress>,
     ) -> Result<UploadPermit, RequestError> {
+        let permit = self.upload_slot_for(size, client)?;
+        let capacity = self.pool.check_capacity(permit.client);
+        capacity.map_err(|error| of_pool(error, self.limits.deadline))?;
+        Ok(permit)
+    }
+
+    /// Takes an upload permit for the body of a durable job, which takes no place in the queue.
+    ///
+    /// # Errors
+    /// `UploadsFull`, `UploadShareFull` or `Draining`.
+    pub fn job_upload_permit_of(&self, request: &Request) -> Result<UploadPermit, RequestError> {
+        let client = request.extensions().get::<ClientAddress>().copied();
+        self.upload_slot_for(BodySize::of(request.body(), self.limits.body), client)
+    }
+
+    /// Takes an upload permit whatever waits in the queue.
+    fn upload_slot_for(
+        &self,
+        size: BodySize,
+        client: Option<ClientAddress>,
+    ) -> Result<UploadPermit, RequestError> {
         let permit = self.uploads.take(size, client);
         // Checked after the permit was taken: a drain waits for the permits taken before it.
         self.check_serving()?;
@@ -238,8 +283,32 @@ impl App {
             UploadRefusal::ShareFull(held) => RequestError::UploadShareFull { held, retry_after },
         })?;
         let client = client.filter(|_| self.sharing == Sharing::ByAddress);
-        (self.pool.check_capacity(client)).map_err(|error| of_pool(error, self.limits.deadline))?;
         Ok(UploadPermit { client, slot })
+    }
+
+    /// Waits until a durable job may take a worker; see [`Pool::job_turn`].
+    pub async fn job_turn(&self) -> JobTurn {
+        self.pool.job_turn().await
+    }
+
+    /// Runs the work of a durable job on a scan of this many bytes, with the work and memory that a request with that scan may cost, but
+    /// with a deadline of its own. Dropping the future cancels the work.
+    ///
+    /// # Errors
+    /// `Refused`, `Deadline`, `Draining`, or `Internal` when the mender failed or panicked.
+    pub async fn run_durable<T: Send + 'static>(
+        &self,
+        turn: JobTurn,
+        bytes: usize,
+        work: impl FnOnce(&dyn Mender, &Budget<'_>) -> Result<T, Refusal> + Send + 'static,
+    ) -> Result<T, RequestError> {
+        let deadline = Deadline::after(DURABLE_DEADLINE);
+        let mender = Arc::clone(&self.mender);
+        let order = self.task_order(bytes, deadline);
+        let outcome = (self.pool)
+            .run_job(turn, order, move |budget| work(&*mender, budget))
+            .await;
+        result_of(outcome, deadline)
     }
 
     /// Runs a job on a scan of this many bytes on a worker, within the deadline and the work and memory that such a scan may cost.
@@ -253,11 +322,11 @@ impl App {
         job: impl FnOnce(&dyn Mender, &Budget<'_>) -> Result<T, Refusal> + Send + 'static,
     ) -> Result<T, RequestError> {
         let deadline = Deadline::after(self.limits.deadline);
-        let size = JobSize {
+        let size = TaskSize {
             client: upload.client,
             bytes,
         };
-        self.run_job(Some(upload), size, deadline, job).await
+        self.run_task(Some(upload), size, deadline, job).await
     }
 
     /// Runs a job on a session, on a worker, within the deadline, which includes waiting for exclusive use of the session. A request that
@@ -276,18 +345,18 @@ impl App {
         let lease = self.sessions.lease(id, std::time::Instant::now())?;
         let guard = timeout_at(deadline.at, lease.exclusive()).await;
         let guard = guard.map_err(|_| of_pool(PoolError::Expired, deadline.length))?;
-        let size = JobSize {
+        let size = TaskSize {
             client: upload.client,
             bytes: guard.scan_bytes(),
         };
-        self.run_job(Some(upload), size, deadline, move |_, budget| {
+        self.run_task(Some(upload), size, deadline, move |_, budget| {
             guard.run(|session| job(session, budget))
         })
         .await
     }
 
     /// What a job on a scan of this many bytes may cost.
-    fn job_limits(&self, bytes: usize) -> Limits {
+    fn task_limits(&self, bytes: usize) -> Limits {
         let memory = (MEMORY_PER_BYTE * bytes).max(LEAST_MEMORY);
         Limits {
             work: (WORK_PER_BYTE * bytes as u64).max(self.limits.work.as_nanos() as u64),
@@ -299,19 +368,23 @@ impl App {
         }
     }
 
-    async fn run_job<T: Send + 'static>(
+    fn task_order(&self, bytes: usize, deadline: Deadline) -> TaskOrder {
+        TaskOrder {
+            cost: TASK_COST + bytes as u64,
+            deadline: deadline.at,
+            limits: self.task_limits(bytes),
+        }
+    }
+
+    async fn run_task<T: Send + 'static>(
         &self,
         upload: Option<UploadPermit>,
-        size: JobSize,
+        size: TaskSize,
         deadline: Deadline,
         job: impl FnOnce(&dyn Mender, &Budget<'_>) -> Result<T, Refusal> + Send + 'static,
     ) -> Result<T, RequestError> {
         let mender = Arc::clone(&self.mender);
-        let order = JobOrder {
-            cost: JOB_COST + size.bytes as u64,
-            deadline: deadline.at,
-            limits: self.job_limits(size.bytes),
-        };
+        let order = self.task_order(size.bytes, deadline);
         let outcome = match self.pool.reserve(size.client) {
             Ok(permit) => {
                 let answer = (self.pool).run(permit, order, move |budget| job(&*mender, budget));
@@ -321,20 +394,7 @@ impl App {
             }
             Err(error) => Err(error),
         };
-        match outcome {
-            Ok(Ok(value)) => Ok(value),
-            Ok(Err(refusal)) if refusal.is_internal() => {
-                let code = refusal.code.word;
-                error!(code, detail = refusal.detail, "mending failed");
-                Err(RequestError::Internal)
-            }
-            // The next step would have ended after the deadline, so it was not begun.
-            Ok(Err(refusal)) if refusal.code == codes::DEADLINE_EXCEEDED => {
-                Err(of_pool(PoolError::Expired, deadline.length))
-            }
-            Ok(Err(refusal)) => Err(RequestError::Refused(refusal)),
-            Err(error) => Err(of_pool(error, deadline.length)),
-        }
+        result_of(outcome, deadline)
     }
 
     /// Checks that the service is warm and does not shut down.
@@ -365,6 +425,7 @@ impl App {
     /// Refuses new requests, waits for the bodies being received, then closes the queue; its jobs still run.
     pub async fn drain(&self) {
         self.draining.store(true, Relaxed);
+        self.stopping.cancel();
         self.uploads.drained().await;
         self.pool.close();
     }
@@ -372,7 +433,29 @@ impl App {
     /// Closes the queue at once.
     pub fn close(&self) {
         self.draining.store(true, Relaxed);
+        self.stopping.cancel();
         self.pool.close();
+    }
+}
+
+/// The result of a task, or the error that its caller receives.
+fn result_of<T>(
+    outcome: Result<Result<T, Refusal>, PoolError>,
+    deadline: Deadline,
+) -> Result<T, RequestError> {
+    match outcome {
+        Ok(Ok(value)) => Ok(value),
+        Ok(Err(refusal)) if refusal.is_internal() => {
+            let code = refusal.code.word;
+            error!(code, detail = refusal.detail, "mending failed");
+            Err(RequestError::Internal)
+        }
+        // The next step would have ended after the deadline, so it was not begun.
+        Ok(Err(refusal)) if refusal.code == codes::DEADLINE_EXCEEDED => {
+            Err(of_pool(PoolError::Expired, deadline.length))
+        }
+        Ok(Err(refusal)) => Err(RequestError::Refused(refusal)),
+        Err(error) => Err(of_pool(error, deadline.length)),
     }
 }
 

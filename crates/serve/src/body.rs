@@ -128,7 +128,28 @@ pub async fn receive_scan<P: Parameters>(
     app: &App,
     request: Request,
 ) -> Result<ScanRequest<P>, RequestError> {
-    match app.upload_permit_of(&request, app.limits.body) {
+    let upload = app.upload_permit_of(&request, app.limits.body);
+    receive_with(app, request, upload).await
+}
+
+/// Receives a request with a scan that becomes a durable job, whatever waits in the queue.
+///
+/// # Errors
+/// Those of [`receive_scan`] but `QueueFull`.
+pub async fn receive_job_scan<P: Parameters>(
+    app: &App,
+    request: Request,
+) -> Result<ScanRequest<P>, RequestError> {
+    let upload = app.job_upload_permit_of(&request);
+    receive_with(app, request, upload).await
+}
+
+async fn receive_with<P: Parameters>(
+    app: &App,
+    request: Request,
+    upload: Result<UploadPermit, RequestError>,
+) -> Result<ScanRequest<P>, RequestError> {
+    match upload {
         Ok(upload) => read_scan(request, upload, &app.limits).await,
         Err(error) => {
             discard(request, &app.limits);

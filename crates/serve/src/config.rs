@@ -1,6 +1,6 @@
 //! The service's settings, each a flag or a `DARN_*` variable. All are parsed before a socket is bound.
 
-use std::{net::SocketAddr, ops::RangeInclusive, time::Duration};
+use std::{net::SocketAddr, ops::RangeInclusive, path::PathBuf, time::Duration};
 
 use clap::Args;
 
@@ -33,6 +33,10 @@ pub struct ServeArgs {
     /// Address for gRPC alone; left out, gRPC shares the port
     #[arg(long, env = "DARN_GRPC_LISTEN", value_name = "ADDRESS")]
     pub grpc_listen: Option<SocketAddr>,
+
+    /// Folder in which jobs are kept, which survive the process; left out, the service takes no jobs
+    #[arg(long, env = "DARN_DATA", value_name = "DIR")]
+    pub data: Option<PathBuf>,
 
     /// Scans mended at once, at most 1024; left out, two per processor
     #[arg(long, env = "DARN_WORKERS", value_name = "N", value_parser = workers)]

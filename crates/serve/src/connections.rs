@@ -77,7 +77,7 @@ pub async fn serve(
             async move {
                 let answer = answer.await;
                 drop(guard);
-                answer.map(|answer| answer.map(|body| AnswerBody::new(body, pace)))
+                answer.map(|answer| AnswerBody::new(answer, pace))
             }
         });
         let connection = http.serve_connection(TokioIo::new(io), service);

@@ -2,6 +2,9 @@
 
 use darn_contract::port::Refusal;
 use darn_contract::{Code, FieldError, JsonError, codes};
+use darn_jobs::{JobError, State};
+use tracing::error;
+use uuid::Uuid;
 
 use super::{ended_sessions::EndReason, session_store::SessionError};
 
@@ -102,6 +105,42 @@ pub enum RequestError {
     /// The session does not exist or cannot be used.
     #[error(transparent)]
     Session(#[from] SessionError),
+    /// There are no jobs here.
+    #[error(
+        "this service keeps no jobs: it was started without `--data DIR` (DARN_DATA); POST /inpaint mends at once"
+    )]
+    JobsNotKept,
+    /// There is no such job.
+    #[error("there is no job of this id, or it is forgotten")]
+    NoSuchJob,
+    /// The job has no result yet.
+    #[error("the job is {state} and has no result yet; /jobs/ID/events tells when it has")]
+    JobUnfinished {
+        /// Its state.
+        state: State,
+    },
+    /// The job's state does not allow it.
+    #[error("the job is {state} and cannot be {asked}")]
+    JobWrongState {
+        /// Its state.
+        state: State,
+        /// What was asked, such as "cancelled".
+        asked: &'static str,
+    },
+    /// The job's files are deleted.
+    #[error("the job's files were deleted, because of their age or the space they took")]
+    JobExpired,
+    /// The idempotency key was used for something else.
+    #[error(
+        "the header `idempotency-key` has a key that came before with another scan or other constraints, for job {job}"
+    )]
+    IdempotencyMismatch {
+        /// The job of the first payload.
+        job: Uuid,
+    },
+    /// The disk is full.
+    #[error("the disk on which this service keeps jobs is full (DARN_DATA)")]
+    StorageFull,
     /// Too many jobs wait.
     #[error(
         "{waiting} jobs wait and {running} run, which is all this service takes (DARN_QUEUE); try again in {retry_after} s"
@@ -225,6 +264,13 @@ impl RequestError {
                 SessionError::TooLarge { .. } => codes::SESSION_TOO_LARGE,
                 SessionError::Full { .. } => codes::SESSIONS_FULL,
             },
+            Self::JobsNotKept => codes::JOBS_NOT_KEPT,
+            Self::NoSuchJob => codes::NO_SUCH_JOB,
+            Self::JobUnfinished { .. } => codes::JOB_UNFINISHED,
+            Self::JobWrongState { .. } => codes::JOB_WRONG_STATE,
+            Self::JobExpired => codes::JOB_EXPIRED,
+            Self::IdempotencyMismatch { .. } => codes::IDEMPOTENCY_MISMATCH,
+            Self::StorageFull => codes::STORAGE_FULL,
             Self::QueueFull { .. } => codes::QUEUE_FULL,
             Self::UploadsFull { .. } | Self::UploadShareFull { .. } => codes::UPLOADS_FULL,
             Self::MemoryFull { .. } => codes::MEMORY_FULL,
@@ -260,3 +306,25 @@ impl RequestError {
         }
     }
 }
+
+impl From<JobError> for RequestError {
+    fn from(error: JobError) -> Self {
+        match error {
+            JobError::NoSuchJob(_) => Self::NoSuchJob,
+            JobError::WrongState {
+                state, asked: READ, ..
+            } if !state.is_finished() => Self::JobUnfinished { state },
+            JobError::WrongState { state, asked, .. } => Self::JobWrongState { state, asked },
+            JobError::Expired(_) => Self::JobExpired,
+            JobError::IdempotencyMismatch { job } => Self::IdempotencyMismatch { job },
+            JobError::StorageFull => Self::StorageFull,
+            error => {
+                error!(?error, "the jobs failed");
+                Self::Internal
+            }
+        }
+    }
+}
+
+/// What [`JobError::WrongState`] says was asked when a file of a job was to be read.
+const READ: &str = "read";

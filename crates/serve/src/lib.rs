@@ -27,7 +27,13 @@ pub mod generated {
 }
 mod grpc;
 mod healthcheck;
-mod job;
+mod job_answer;
+mod job_events;
+mod job_message;
+mod job_request;
+mod job_routes;
+mod job_worker;
+
 mod kept_session;
 mod log_queue;
 mod media_types;
@@ -35,6 +41,8 @@ pub mod openapi;
 mod pace;
 mod parameters;
 mod pool;
+mod pool_task;
+mod prefer;
 mod problem;
 mod request_body;
 mod response;
@@ -53,6 +61,7 @@ use std::{
     io,
     net::SocketAddr,
     num::NonZero,
+    path::PathBuf,
     sync::Arc,
     thread,
     time::{Duration, Instant},
@@ -61,8 +70,9 @@ use std::{
 use axum::Router;
 use tokio::{net::TcpListener, runtime, task, time};
 use tokio_util::sync::CancellationToken;
-use tracing::{error, info};
+use tracing::{error, info, warn};
 
+use self::job_worker::JobWorker;
 pub use self::{
     app::App,
     config::{ServeArgs, duration},
@@ -70,10 +80,13 @@ pub use self::{
     log_queue::{LogGuard, write_to_stderr},
     telemetry::{LogDelivery, LogError, LogFormat, start_logging},
 };
-use darn_contract::port::Mender;
+use darn_contract::{error_chain, port::Mender};
 
 /// How often metric samples are aggregated and idle sessions ended.
 const UPKEEP_INTERVAL: Duration = Duration::from_secs(5);
+
+/// Longest time in which jobs are given back at the end.
+const JOBS_END: Duration = Duration::from_secs(5);
 
 /// Why the service could not start, or ended.
 #[derive(Debug, thiserror::Error)]
@@ -99,6 +112,14 @@ pub enum ServeError {
     /// Threads, signals or sockets failed.
     #[error("the service failed: {0}")]
     Io(#[from] io::Error),
+    /// The folder of the jobs cannot be used.
+    #[error("the jobs in {} cannot be opened: {}", .folder.display(), error_chain(.source))]
+    Jobs {
+        /// The folder of the settings (DARN_DATA).
+        folder: PathBuf,
+        /// Why not.
+        source: darn_jobs::JobError,
+    },
     /// The warm-up mend failed, so no request could succeed.
     #[error("the warm-up mend failed: {0}")]
     WarmUp(String),
@@ -119,7 +140,7 @@ pub fn run(settings: &ServeArgs, mender: Arc<dyn Mender>) -> Result<(), ServeErr
         .build()?;
     let outcome = runtime.block_on(async {
         let sockets = Sockets::bind(settings.listen, settings.grpc_listen).await?;
-        let app = App::start(settings, mender)?;
+        let app = App::start(settings, mender).await?;
         let (stop, abort) = (CancellationToken::new(), CancellationToken::new());
         shutdown::on_signal(stop.clone(), abort.clone())?;
         tokio::select! {
@@ -194,12 +215,20 @@ pub async fn serve(
         }
     });
 
+    let warm = CancellationToken::new();
+    let working = app.jobs.as_ref().map(|jobs| {
+        let worker = JobWorker::new(&app, jobs, stop.clone());
+        tokio::spawn(worker.work_once(warm.clone().cancelled_owned()))
+    });
     let warm_up = {
         let (app, stop) = (Arc::clone(&app), stop.clone());
         async move {
             let outcome = app.warm_up().await;
             match &outcome {
-                Ok(()) => info!("ready"),
+                Ok(()) => {
+                    info!("ready");
+                    warm.cancel();
+                }
                 Err(error::RequestError::Draining) => return Ok(()),
                 Err(error) => {
                     error!(fault = %error, "the warm-up mend failed");
@@ -220,6 +249,13 @@ pub async fn serve(
     let outcome = shutdown::with_bounded_drain(serving, &stop, drain).await;
     let stopped_early = !stop.is_cancelled();
     stop.cancel();
+    // The jobs that run are given back, so that another start does not count their attempts.
+    if let Some(mut working) = working {
+        if time::timeout(JOBS_END, &mut working).await.is_err() {
+            warn!("jobs could not be given back; their leases will run out");
+            working.abort();
+        }
+    }
     upkeep.abort();
     drained.abort();
     if warm_up.is_finished() {

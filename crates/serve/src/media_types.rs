@@ -22,3 +22,5 @@ pub const PROBLEM_JSON: &str = "application/problem+json";
 pub const TEXT: &str = "text/plain";
 /// Metrics in the Prometheus text format.
 pub const PROMETHEUS: &str = "text/plain; version=0.0.4";
+/// Server-sent events.
+pub const EVENT_STREAM: &str = "text/event-stream";

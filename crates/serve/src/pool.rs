@@ -15,14 +15,14 @@ use std::{
 };
 
 use tokio::{
-    sync::oneshot,
+    sync::{Notify, oneshot},
     time::{Instant, timeout_at},
 };
 use tracing::Span;
 
 use super::{
     fair_queue::{Client, FairQueue, Started},
-    job::{Job, JobOrder, PoolError, QueuedJob},
+    pool_task::{PoolError, PoolTask, QueuedTask, TaskOrder},
     telemetry::PoolMetrics,
 };
 use darn_budget::Budget;
@@ -49,13 +49,17 @@ struct Shared {
     /// Moving average of the jobs' run time, in microseconds; 0 before the first.
     mean_run_time: AtomicU64,
     metrics: PoolMetrics,
+    /// A place or a turn was taken or given back.
+    places_changed: Notify,
 }
 
 struct Queue {
-    jobs: FairQueue<Box<dyn QueuedJob>>,
+    jobs: FairQueue<Box<dyn QueuedTask>>,
     /// Places taken, in all and by each client.
     taken: usize,
     taken_by: HashMap<Client, usize>,
+    /// Turns of durable jobs, which take no places.
+    turns: usize,
     closed: bool,
 }
 
@@ -76,6 +80,39 @@ impl Drop for QueuePermit {
                 queue.taken_by.remove(&self.client);
             }
         }
+        drop(queue);
+        self.shared.places_changed.notify_one();
+    }
+}
+
+/// A durable job's right to a worker; given back when dropped.
+#[derive(Debug)]
+pub struct JobTurn {
+    shared: Arc<Shared>,
+}
+
+impl JobTurn {
+    /// Waits until requests need the worker that was idle when this turn was given. The only turn keeps its worker, so that jobs have one
+    /// however many requests come.
+    pub async fn needed_by_requests(&self) {
+        loop {
+            let changed = self.shared.places_changed.notified();
+            let is_needed = {
+                let queue = self.shared.lock();
+                queue.turns > 1 && queue.taken + queue.turns > self.shared.workers
+            };
+            if is_needed {
+                return;
+            }
+            changed.await;
+        }
+    }
+}
+
+impl Drop for JobTurn {
+    fn drop(&mut self) {
+        self.shared.lock().turns -= 1;
+        self.shared.places_changed.notify_one();
     }
 }
 
@@ -101,6 +138,7 @@ impl Pool {
                 jobs: FairQueue::new(workers - workers / SHARE_OF_OTHERS),
                 taken: 0,
                 taken_by: HashMap::new(),
+                turns: 0,
                 closed: false,
             }),
             filled: Condvar::new(),
@@ -110,6 +148,7 @@ impl Pool {
             running: AtomicUsize::new(0),
             mean_run_time: AtomicU64::new(0),
             metrics,
+            places_changed: Notify::new(),
         });
         let pool = Self(Arc::clone(&shared));
         for index in 0..workers {
@@ -138,6 +177,7 @@ impl Pool {
             queue.taken += 1;
             *queue.taken_by.entry(client).or_default() += 1;
         })?;
+        self.0.places_changed.notify_one();
         Ok(QueuePermit {
             shared: Arc::clone(&self.0),
             client,
@@ -152,17 +192,56 @@ impl Pool {
     pub fn run<T: Send + 'static>(
         &self,
         permit: QueuePermit,
-        order: JobOrder,
+        order: TaskOrder,
+        work: impl FnOnce(&Budget<'_>) -> T + Send + 'static,
+    ) -> impl Future<Output = Result<T, PoolError>> {
+        let client = permit.client;
+        self.queue(client, permit, order, work)
+    }
+
+    /// Waits for a durable job's turn: until a worker is idle, or no job has a turn. One task alone waits for turns.
+    pub async fn job_turn(&self) -> JobTurn {
+        loop {
+            let changed = self.0.places_changed.notified();
+            {
+                let mut queue = self.0.lock();
+                if queue.turns == 0 || queue.taken + queue.turns < self.0.workers {
+                    queue.turns += 1;
+                    let shared = Arc::clone(&self.0);
+                    return JobTurn { shared };
+                }
+            }
+            changed.await;
+        }
+    }
+
+    /// Queues the work of a durable job, as [`Pool::run`] does that of a request. It stands beside the requests of clients without an address.
+    ///
+    /// # Errors
+    /// `Closed`, `Expired` or `Panicked`.
+    pub fn run_job<T: Send + 'static>(
+        &self,
+        turn: JobTurn,
+        order: TaskOrder,
+        work: impl FnOnce(&Budget<'_>) -> T + Send + 'static,
+    ) -> impl Future<Output = Result<T, PoolError>> {
+        self.queue(None, turn, order, work)
+    }
+
+    fn queue<T: Send + 'static, P: Send + 'static>(
+        &self,
+        client: Client,
+        permit: P,
+        order: TaskOrder,
         work: impl FnOnce(&Budget<'_>) -> T + Send + 'static,
     ) -> impl Future<Output = Result<T, PoolError>> {
         let (reply, answer) = oneshot::channel();
-        let JobOrder {
+        let TaskOrder {
             cost,
             deadline,
             limits,
         } = order;
-        let client = permit.client;
-        let job = Job {
+        let job = PoolTask {
             work,
             reply,
             deadline,
@@ -200,7 +279,7 @@ impl Shared {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn push(&self, client: Client, cost: u64, job: Box<dyn QueuedJob>) -> Result<(), PoolError> {
+    fn push(&self, client: Client, cost: u64, job: Box<dyn QueuedTask>) -> Result<(), PoolError> {
         let mut queue = self.lock();
         if queue.closed {
             // Not under the lock: the job's place locks the queue when it is given back.
@@ -260,7 +339,7 @@ impl Shared {
     }
 
     /// Waits for the next job; `None` once the queue is closed and empty.
-    fn next(&self) -> Option<(Started, Box<dyn QueuedJob>)> {
+    fn next(&self) -> Option<(Started, Box<dyn QueuedTask>)> {
         let mut queue = self.lock();
         loop {
             if let Some(next) = queue.jobs.pop() {
@@ -287,7 +366,7 @@ impl Shared {
         }
     }
 
-    fn run_job(&self, job: Box<dyn QueuedJob>) {
+    fn run_job(&self, job: Box<dyn QueuedTask>) {
         if !job.is_wanted() {
             self.metrics.skipped.increment(1);
             return;

@@ -17,8 +17,8 @@ fn soon() -> Instant {
 }
 
 /// A job that costs 1 and has no limits but its deadline.
-fn by(deadline: Instant) -> JobOrder {
-    JobOrder {
+fn by(deadline: Instant) -> TaskOrder {
+    TaskOrder {
         cost: 1,
         deadline,
         limits: Limits::default(),

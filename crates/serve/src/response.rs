@@ -7,7 +7,7 @@ use axum::{
     http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
 };
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
 use super::{
@@ -88,10 +88,104 @@ impl MendResponse {
         let report = (preferred == MULTIPART_MIXED).then(|| json(&self.report));
         let file = FilePart {
             name: self.part,
-            media_type: self.media_type,
+            media_type: self.media_type.to_owned(),
             bytes: self.bytes,
         };
         file.render(report, headers)
+    }
+
+    /// Counts the mend and takes it apart, for a job that keeps it; to be called on a worker.
+    pub fn keep(self, metrics: &Metrics) -> KeptMend {
+        metrics.mended(&self.report);
+        let digest = digest::of(&self.bytes).map(|value| (REPR_DIGEST, value));
+        let headers = report_headers(&self.report);
+        KeptMend {
+            answer: KeptAnswer::new(
+                self.media_type,
+                headers
+                    .into_iter()
+                    .chain(digest.map(|(name, value)| (Some(name), value))),
+            ),
+            bytes: self.bytes,
+            report: json(&self.report),
+        }
+    }
+}
+
+/// A mend taken apart.
+#[derive(Debug)]
+pub struct KeptMend {
+    /// What goes with its scan in an answer.
+    pub answer: KeptAnswer,
+    /// The mended scan.
+    pub bytes: Vec<u8>,
+    /// The report, as JSON.
+    pub report: Vec<u8>,
+}
+
+/// What goes with a mended scan in an answer, as it is kept with a job.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct KeptAnswer {
+    media_type: String,
+    headers: Vec<(String, String)>,
+}
+
+impl KeptAnswer {
+    fn new(
+        media_type: &str,
+        headers: impl Iterator<Item = (Option<HeaderName>, HeaderValue)>,
+    ) -> Self {
+        let texts = headers.filter_map(|(name, value)| {
+            let value = value.to_str().ok()?.to_owned();
+            Some((name?.as_str().to_owned(), value))
+        });
+        Self {
+            media_type: media_type.to_owned(),
+            headers: texts.collect(),
+        }
+    }
+
+    /// The scan's media type.
+    pub fn media_type(&self) -> &str {
+        &self.media_type
+    }
+
+    /// How the mend went; see [`RESULT`].
+    pub fn result(&self) -> Option<&str> {
+        let found = self
+            .headers
+            .iter()
+            .find(|(name, _)| RESULT == name.as_str());
+        found.map(|(_, value)| value.as_str())
+    }
+
+    /// The headers of an answer of the scan alone.
+    pub fn headers(&self) -> HeaderMap {
+        let texts = self.headers.iter().filter_map(|(name, value)| {
+            let name = HeaderName::try_from(name.as_str()).ok()?;
+            Some((name, HeaderValue::try_from(value.as_str()).ok()?))
+        });
+        let mut headers: HeaderMap = texts.collect();
+        headers.extend(
+            HeaderValue::try_from(self.media_type.as_str())
+                .map(|value| (header::CONTENT_TYPE, value)),
+        );
+        headers.insert(NO_STORE.0, HeaderValue::from_static(NO_STORE.1));
+        headers
+    }
+
+    /// An answer of the scan with its report, in multipart/mixed; to be called on a thread that may block.
+    pub fn with_report(&self, bytes: Vec<u8>, report: Vec<u8>) -> Response {
+        let mut headers = self.headers();
+        for replaced in [header::CONTENT_TYPE, header::CACHE_CONTROL, REPR_DIGEST] {
+            headers.remove(replaced);
+        }
+        let file = FilePart {
+            name: "scan",
+            media_type: self.media_type.clone(),
+            bytes,
+        };
+        file.render(Some(report), headers)
     }
 }
 
@@ -106,7 +200,7 @@ pub fn stripped(stripped: Stripped, preferred: &str) -> Response {
     let report = (preferred == MULTIPART_MIXED).then(|| json(&stripped.report));
     let file = FilePart {
         name: "scan",
-        media_type: stripped.media_type,
+        media_type: stripped.media_type.to_owned(),
         bytes: stripped.bytes,
     };
     file.render(report, headers)
@@ -116,7 +210,7 @@ pub fn stripped(stripped: Stripped, preferred: &str) -> Response {
 struct FilePart {
     /// Name of its part in multipart/mixed.
     name: &'static str,
-    media_type: &'static str,
+    media_type: String,
     bytes: Vec<u8>,
 }
 
@@ -125,7 +219,7 @@ impl FilePart {
     fn render(self, report: Option<Vec<u8>>, mut headers: HeaderMap) -> Response {
         let (media_type, body) = match report {
             Some(report) => self.multipart(&report),
-            None => (self.media_type.to_owned(), self.bytes),
+            None => (self.media_type, self.bytes),
         };
         headers.extend(digest::of(&body).map(|value| (REPR_DIGEST, value)));
         let media_type = [(header::CONTENT_TYPE, media_type)];
@@ -138,7 +232,7 @@ impl FilePart {
         let mut body = Vec::with_capacity(self.bytes.len() + report.len() + 512);
         for (name, media_type, bytes) in [
             ("report", JSON, report),
-            (self.name, self.media_type, &self.bytes),
+            (self.name, &self.media_type, &self.bytes),
         ] {
             let head = format!(
                 "--{boundary}\r\ncontent-disposition: attachment; name=\"{name}\"\r\ncontent-type: {media_type}\r\ncontent-length: {}\r\n\r\n",

@@ -15,7 +15,7 @@ use tower_http::{
     catch_panic::CatchPanicLayer,
     cors::{AllowOrigin, CorsLayer},
 };
-use tracing::{Instrument as _, info, info_span};
+use tracing::{Instrument as _, info, info_span, warn};
 
 use super::{
     accept::preferred,
@@ -24,14 +24,19 @@ use super::{
     counted::counted_answer,
     digest::{CONTENT_DIGEST, REPR_DIGEST},
     error::RequestError,
+    job_events::LAST_EVENT_ID,
+    job_request::IDEMPOTENCY_KEY,
+    job_routes,
     media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, PROMETHEUS, ZIP},
     openapi, parameters,
+    prefer::{PREFER, PREFERENCE_APPLIED, Preferences},
     response::{self, ANCHOR_DISTANCE, HOLES_FILLED, LOOPS_SKIPPED, MendResponse, RESULT, STRIP},
     scan_files::AnswerForm,
     service_info, session_routes,
     telemetry::{REQUEST_ID, RequestId},
 };
 use darn_contract::{Constraints, Search, excerpt};
+use darn_jobs::State as JobState;
 
 /// All HTTP routes; [`finish`] makes them a service.
 pub fn routes() -> Router<Arc<App>> {
@@ -41,6 +46,7 @@ pub fn routes() -> Router<Arc<App>> {
         .route("/optimize-anchor", post(optimize_anchor))
         .route("/strip", post(strip))
         .merge(session_routes::routes())
+        .merge(job_routes::routes())
         .route("/livez", get(|| async { "alive\n" }))
         .route("/readyz", get(readyz))
         .route("/metrics", get(metrics))
@@ -84,6 +90,9 @@ fn cors(origins: &[String]) -> CorsLayer {
             CONTENT_DIGEST,
             REPR_DIGEST,
             REQUEST_ID,
+            PREFER,
+            IDEMPOTENCY_KEY,
+            LAST_EVENT_ID,
         ])
         .expose_headers([
             HOLES_FILLED,
@@ -93,7 +102,9 @@ fn cors(origins: &[String]) -> CorsLayer {
             REPR_DIGEST,
             ANCHOR_DISTANCE,
             REQUEST_ID,
+            PREFERENCE_APPLIED,
             header::LOCATION,
+            header::CONTENT_LOCATION,
             header::RETRY_AFTER,
         ])
 }
@@ -155,6 +166,10 @@ async fn observe(State(app): State<Arc<App>>, mut request: Request, next: Next) 
 }
 
 async fn inpaint(State(app): State<Arc<App>>, request: Request) -> Result<Response, RequestError> {
+    let preferences = Preferences::of(request.headers());
+    if let (true, Some(jobs)) = (preferences.respond_async, &app.jobs) {
+        return job_routes::inpaint_later(&app, jobs, request, preferences).await;
+    }
     let headers = request.headers().clone();
     let ScanRequest {
         scan,
@@ -252,5 +267,14 @@ async fn metrics(State(app): State<Arc<App>>) -> impl IntoResponse {
     // The gauges must not count sessions that were idle for too long.
     let sessions = Arc::clone(&app.sessions);
     (task::spawn_blocking(move || sessions.end_idle(Instant::now())).await).ok();
+    if let Some(jobs) = &app.jobs {
+        match jobs.counts().await {
+            Ok(counts) => {
+                let of = |state| counts.get(&state).copied().unwrap_or_default();
+                (app.metrics).durable_jobs(of(JobState::Waiting), of(JobState::Running));
+            }
+            Err(error) => warn!(?error, "the jobs cannot be counted"),
+        }
+    }
     ([(header::CONTENT_TYPE, PROMETHEUS)], app.metrics.render())
 }

@@ -71,7 +71,10 @@ fn property(field: &FieldDescriptorProto) -> Value {
         Type::Bytes => json!({ "type": "string", "contentEncoding": "base64" }),
         Type::Message | Type::Enum => match field.type_name().strip_prefix(".darn.v1.") {
             Some(name) => json!({ "$ref": format!("#/components/schemas/{name}") }),
-            // The only message used from elsewhere is google.protobuf.ListValue.
+            None if field.type_name().ends_with(".Timestamp") => {
+                json!({ "type": "string", "format": "date-time" })
+            }
+            // The only other message used from elsewhere is google.protobuf.ListValue.
             None => json!({ "type": "array", "items": { "type": "number" } }),
         },
         // 64-bit numbers are strings in proto3 JSON.

@@ -12,6 +12,8 @@ use super::{app::App, response};
 struct Info {
     /// darn's version.
     version: &'static str,
+    /// Whether the service keeps jobs.
+    jobs: bool,
     limits: InfoLimits,
 }
 
@@ -30,6 +32,7 @@ struct InfoLimits {
 pub async fn answer(State(app): State<Arc<App>>) -> Response {
     response::json_response(response::json(&Info {
         version: env!("CARGO_PKG_VERSION"),
+        jobs: app.jobs.is_some(),
         limits: InfoLimits {
             body_bytes: app.limits.body,
             deadline_seconds: app.limits.deadline.as_secs_f64(),

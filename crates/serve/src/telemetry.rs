@@ -213,7 +213,21 @@ impl Metrics {
             None,
             "holes filled".into(),
         );
-        recorder.describe_gauge("darn_jobs".into(), None, "jobs waiting and running".into());
+        recorder.describe_gauge(
+            "darn_jobs".into(),
+            None,
+            "requests and jobs in the worker pool, waiting and running".into(),
+        );
+        recorder.describe_gauge(
+            "darn_jobs_waiting".into(),
+            None,
+            "durable jobs that wait".into(),
+        );
+        recorder.describe_gauge(
+            "darn_jobs_running".into(),
+            None,
+            "durable jobs that run".into(),
+        );
         recorder.describe_gauge("darn_sessions".into(), None, "sessions open".into());
         recorder.describe_gauge(
             "darn_session_bytes".into(),
@@ -271,6 +285,19 @@ impl Metrics {
             expired: ended("idle"),
             evicted: ended("evicted"),
             deleted: ended("deleted"),
+        }
+    }
+
+    /// Sets how many durable jobs wait and run.
+    pub fn durable_jobs(&self, waiting: i64, running: i64) {
+        for (name, jobs) in [
+            ("darn_jobs_waiting", waiting),
+            ("darn_jobs_running", running),
+        ] {
+            let gauge = self
+                .recorder
+                .register_gauge(&Key::from_name(name), &METADATA);
+            gauge.set(jobs as f64);
         }
     }
 

@@ -1,13 +1,13 @@
-//! A job in the pool's queue: its work, its caller, its deadline and its place.
+//! A task in the pool's queue: its work, its caller, its deadline and its place.
 //!
-//! A job owns all of these, so dropping it settles them: its caller gets an answer and its place is free again.
+//! A task owns all of these, so dropping it settles them: its caller gets an answer and its place is free again.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use tokio::{sync::oneshot, time::Instant};
 use tracing::{Span, warn};
 
-use super::{pool::QueuePermit, telemetry::PoolMetrics};
+use super::telemetry::PoolMetrics;
 use darn_budget::{Budget, Limits};
 
 /// Why a job has no result.
@@ -36,7 +36,7 @@ pub enum PoolError {
 
 /// What a job is ordered by, and its limits.
 #[derive(Debug, Clone)]
-pub struct JobOrder {
+pub struct TaskOrder {
     /// Its estimated cost, in any unit that all jobs share.
     pub cost: u64,
     /// When its result comes too late.
@@ -46,7 +46,7 @@ pub struct JobOrder {
 }
 
 /// A job with any type of result, as the queue sees it.
-pub trait QueuedJob: Send {
+pub trait QueuedTask: Send {
     /// Whether its caller still waits and its deadline has not passed.
     fn is_wanted(&self) -> bool;
     /// When it was queued.
@@ -56,7 +56,7 @@ pub trait QueuedJob: Send {
 }
 
 /// A job with a result of type `T`.
-pub struct Job<T, W> {
+pub struct PoolTask<T, W, P> {
     /// What to run.
     pub work: W,
     /// Where its result goes; closed when nobody waits for it any more.
@@ -69,8 +69,8 @@ pub struct Job<T, W> {
     pub queued_at: Instant,
     /// The log span of its request.
     pub span: Span,
-    /// Its place.
-    pub permit: QueuePermit,
+    /// Its place; given back when it ends.
+    pub permit: P,
 }
 
 /// Whether a caller still waits for a reply and its deadline has not passed.
@@ -78,7 +78,7 @@ fn is_waited_for<R>(reply: &oneshot::Sender<R>, deadline: Instant) -> bool {
     !reply.is_closed() && Instant::now() < deadline
 }
 
-impl<T: Send, W: FnOnce(&Budget<'_>) -> T + Send> QueuedJob for Job<T, W> {
+impl<T: Send, W: FnOnce(&Budget<'_>) -> T + Send, P: Send> QueuedTask for PoolTask<T, W, P> {
     fn is_wanted(&self) -> bool {
         is_waited_for(&self.reply, self.deadline)
     }

@@ -1,0 +1,115 @@
+//! The changes of a job as server-sent events (<https://html.spec.whatwg.org/multipage/server-sent-events.html>).
+
+use std::{
+    pin::Pin,
+    sync::Arc,
+    task::{Context, Poll},
+    time::Duration,
+};
+
+use axum::{
+    body::Body,
+    http::{HeaderMap, HeaderName, StatusCode, header},
+    response::{IntoResponse, Response},
+};
+use bytes::Bytes;
+use darn_jobs::{Job, Jobs};
+use hyper::body::Frame;
+use tokio::{select, sync::mpsc, time::sleep};
+use tokio_util::sync::CancellationToken;
+
+use super::{answer::LiveAnswer, job_message::message, media_types::EVENT_STREAM, response};
+
+/// The version that a client has seen last; browsers send it when they connect again.
+pub const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
+
+/// Keeps a proxy from collecting events before it hands them on.
+const NO_BUFFERING: (HeaderName, &str) = (HeaderName::from_static("x-accel-buffering"), "no");
+/// How often a comment is sent while nothing changes, so that nobody between takes the connection for dead.
+const COMMENT_EVERY: Duration = Duration::from_secs(15);
+/// Events that wait for a client that reads slowly; then the changes wait.
+const EVENTS_AHEAD: usize = 4;
+
+/// The events of a job from its present state on, until it is finished or deleted or the service stops. Nothing (204, after which a browser does
+/// not connect again) for a client that has seen the job finished.
+pub fn answer(
+    jobs: &Arc<Jobs>,
+    job: Job,
+    headers: &HeaderMap,
+    stopping: CancellationToken,
+) -> Response {
+    let seen = headers.get(LAST_EVENT_ID);
+    let seen = seen.and_then(|id| id.to_str().ok()?.trim().parse::<i64>().ok());
+    if job.state.is_finished() && seen == Some(job.version) {
+        return StatusCode::NO_CONTENT.into_response();
+    }
+    let (events, received) = mpsc::channel(EVENTS_AHEAD);
+    let jobs = Arc::clone(jobs);
+    tokio::spawn(async move {
+        // Versions start at 1: whoever has seen none is told the present one.
+        let told = tell(&jobs, job, seen.unwrap_or(0), &events);
+        select! {
+            () = told => {}
+            () = events.closed() => {}
+            () = stopping.cancelled() => {}
+        }
+    });
+    let headers = [
+        (header::CONTENT_TYPE, EVENT_STREAM),
+        (header::CACHE_CONTROL, "no-store"),
+        NO_BUFFERING,
+    ];
+    let mut answer = (headers, Body::new(EventBody { received })).into_response();
+    answer.extensions_mut().insert(LiveAnswer);
+    answer
+}
+
+async fn tell(jobs: &Jobs, job: Job, mut seen: i64, events: &mpsc::Sender<Bytes>) {
+    let id = job.id;
+    loop {
+        let text = select! {
+            () = sleep(COMMENT_EVERY) => Bytes::from_static(b":\n\n"),
+            job = jobs.changed_since(id, seen) => {
+                // Deleted, or the database failed: the client asks again and is told.
+                let Ok(job) = job else {
+                    return;
+                };
+                seen = job.version;
+                let event = event(&job);
+                if job.state.is_finished() {
+                    events.send(event).await.ok();
+                    return;
+                }
+                event
+            }
+        };
+        if events.send(text).await.is_err() {
+            return;
+        }
+    }
+}
+
+fn event(job: &Job) -> Bytes {
+    // JSON has no line breaks of its own.
+    let mut text = format!("id: {}\nevent: job\ndata: ", job.version).into_bytes();
+    text.extend_from_slice(&response::json(&message(job)));
+    text.extend_from_slice(b"\n\n");
+    text.into()
+}
+
+struct EventBody {
+    received: mpsc::Receiver<Bytes>,
+}
+
+impl hyper::body::Body for EventBody {
+    type Data = Bytes;
+    type Error = std::convert::Infallible;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, Self::Error>>> {
+        let event = self.received.poll_recv(cx);
+        event.map(|event| event.map(|text| Ok(Frame::data(text))))
+    }
+}

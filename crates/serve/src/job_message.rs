@@ -1,0 +1,119 @@
+//! A job as clients see it.
+
+use axum::http::StatusCode;
+use darn_jobs::{CRASHED, Job, State};
+use serde_json::Value;
+
+use super::{
+    job_worker::{MENDING, READING, WAITING, WRITING},
+    response::KeptAnswer,
+};
+use darn_contract::{codes, v1};
+
+/// The message of a job.
+pub fn message(job: &Job) -> v1::Job {
+    let path = |file: &str| format!("/jobs/{}/{file}", job.id);
+    v1::Job {
+        id: job.id.to_string(),
+        name: job.name.clone(),
+        priority: i32::try_from(job.priority).unwrap_or_default(),
+        state: match job.state {
+            State::Waiting => v1::JobState::Waiting,
+            State::Running => v1::JobState::Running,
+            State::Done => v1::JobState::Done,
+            State::Error => v1::JobState::Error,
+            State::Cancelled => v1::JobState::Cancelled,
+        }
+        .into(),
+        stage: stage(job).to_owned(),
+        version: u32::try_from(job.version).unwrap_or(u32::MAX),
+        attempt: u32::try_from(job.attempt).unwrap_or_default(),
+        cancelling: job.cancel_wanted && !job.state.is_finished(),
+        created_at: Some(timestamp(job.created_at)),
+        changed_at: Some(timestamp(job.changed_at)),
+        started_at: job.started_at.map(timestamp),
+        finished_at: job.finished_at.map(timestamp),
+        expired_at: job.expired_at.map(timestamp),
+        result: job.result.as_ref().map(|_| path("result")),
+        report: job.report.as_ref().map(|_| path("report")),
+        outcome: kept_answer(job).and_then(|answer| answer.result().map(str::to_owned)),
+        problem: problem(job),
+    }
+}
+
+/// What goes with the result of a job; `None` unless it is done.
+pub fn kept_answer(job: &Job) -> Option<KeptAnswer> {
+    let answer = job.answer.as_ref().filter(|_| job.state == State::Done)?;
+    serde_json::from_str(answer).ok()
+}
+
+/// The status of a job's failure and its problem document, which has the job's id for a request id; `None` unless it has failed.
+pub fn problem_document(job: &Job) -> Option<(StatusCode, Value)> {
+    let failure = job.failure.as_ref().filter(|_| job.state == State::Error)?;
+    let kept = job.answer.as_ref();
+    let document = kept.and_then(|text| serde_json::from_str::<Value>(text).ok());
+    let document = document.unwrap_or_else(|| {
+        // The store itself gave it up.
+        let code = codes::JOB_CRASHED_WORKER;
+        let status = if failure.code == CRASHED {
+            code.status
+        } else {
+            codes::INTERNAL.status
+        };
+        serde_json::json!({
+            "type": "about:blank",
+            "title": "Internal Server Error",
+            "status": status,
+            "code": failure.code,
+            "detail": failure.message,
+            "request_id": job.id.to_string(),
+        })
+    });
+    let status = document["status"].as_u64();
+    let status = status.and_then(|status| StatusCode::from_u16(u16::try_from(status).ok()?).ok());
+    Some((
+        status.unwrap_or(StatusCode::INTERNAL_SERVER_ERROR),
+        document,
+    ))
+}
+
+fn problem(job: &Job) -> Option<v1::JobProblem> {
+    let (status, document) = problem_document(job)?;
+    let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+    let errors = document["errors"].as_array().into_iter().flatten();
+    Some(v1::JobProblem {
+        status: status.as_u16().into(),
+        code: text(&document["code"]),
+        detail: text(&document["detail"]),
+        errors: errors
+            .map(|error| v1::JobFault {
+                pointer: text(&error["pointer"]),
+                detail: text(&error["detail"]),
+            })
+            .collect(),
+    })
+}
+
+/// What is done now.
+fn stage(job: &Job) -> &'static str {
+    let told = job
+        .progress
+        .as_ref()
+        .map(|progress| progress.stage.as_str());
+    match job.state {
+        State::Waiting => WAITING,
+        State::Running => [READING, MENDING, WRITING]
+            .into_iter()
+            .find(|stage| told == Some(*stage))
+            .unwrap_or(READING),
+        State::Done | State::Error | State::Cancelled => "",
+    }
+}
+
+/// A time in milliseconds since 1970.
+fn timestamp(milliseconds: i64) -> pbjson_types::Timestamp {
+    pbjson_types::Timestamp {
+        seconds: milliseconds.div_euclid(1000),
+        nanos: i32::try_from(milliseconds.rem_euclid(1000) * 1_000_000).unwrap_or_default(),
+    }
+}

@@ -1,0 +1,246 @@
+//! What a client asks for when it hands over a scan as a job, and how that is kept with the job.
+
+use axum::http::{HeaderMap, HeaderName, HeaderValue};
+use darn_jobs::Submission;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    error::{ParameterKind, RequestError},
+    fair_queue::Client,
+    parameters::Parameters,
+    response,
+};
+use darn_contract::{Constraints, FieldError, excerpt, from_json, port::ScanForm, v1};
+
+/// The client's key: a repeated request with it is answered with the first one's job.
+pub const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
+
+/// Most bytes of a key: a database's index takes no more than some 2,000.
+const MAX_KEY_BYTES: usize = 255;
+/// Most characters of a job's name.
+const MAX_NAME_CHARACTERS: usize = 200;
+/// The largest priority, and the negative of the least one.
+const MAX_PRIORITY: i64 = 100;
+
+/// Constraints that have passed the check, as the message that is kept.
+#[derive(Debug)]
+pub struct KeptConstraints(v1::Constraints);
+
+impl Parameters for KeptConstraints {
+    const KIND: ParameterKind = ParameterKind::Constraints;
+    const PART: &'static str = "constraints";
+    type Message = v1::Constraints;
+
+    fn check_message(message: &v1::Constraints) -> Result<Self, Vec<FieldError>> {
+        Constraints::check(message).map(|_| Self(message.clone()))
+    }
+}
+
+/// What is asked, as it is kept with the job.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct JobRequest {
+    /// The constraints as JSON; none are left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    constraints: Option<String>,
+    /// The form in which the mended scan goes back.
+    form: KeptForm,
+}
+
+/// [`ScanForm`] as it is kept.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum KeptForm {
+    AsReceived,
+    Gltf,
+    Glb,
+}
+
+impl JobRequest {
+    /// A request for a mend under constraints, in a form.
+    pub fn new(constraints: Option<KeptConstraints>, form: ScanForm) -> Self {
+        let text = |it: KeptConstraints| String::from_utf8(response::json(&it.0)).ok();
+        Self {
+            constraints: constraints.and_then(text),
+            form: match form {
+                ScanForm::AsReceived => KeptForm::AsReceived,
+                ScanForm::Gltf => KeptForm::Gltf,
+                ScanForm::Glb => KeptForm::Glb,
+            },
+        }
+    }
+
+    /// The text that is kept.
+    pub fn text(&self) -> String {
+        String::from_utf8(response::json(self)).unwrap_or_default()
+    }
+
+    /// Reads the text that is kept; `None` for one that this version cannot read.
+    pub fn read(text: &str) -> Option<Self> {
+        serde_json::from_str(text).ok()
+    }
+
+    /// The constraints, checked again: another version of darn may have taken them.
+    ///
+    /// # Errors
+    /// `Malformed` or `Invalid`.
+    pub fn constraints(&self) -> Result<Constraints, RequestError> {
+        let Some(text) = &self.constraints else {
+            return Ok(Constraints::default());
+        };
+        let message = from_json(text.as_bytes())
+            .map_err(|error| RequestError::of_json(ParameterKind::Constraints, error))?;
+        Constraints::from_message(&message)
+    }
+
+    /// The form in which the mended scan goes back.
+    pub fn form(&self) -> ScanForm {
+        match self.form {
+            KeptForm::AsReceived => ScanForm::AsReceived,
+            KeptForm::Gltf => ScanForm::Gltf,
+            KeptForm::Glb => ScanForm::Glb,
+        }
+    }
+}
+
+/// What a request says about its job beside the scan: its key, and from the URL's query its name and its priority.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct JobLabels {
+    key: Option<String>,
+    name: Option<String>,
+    priority: i64,
+}
+
+impl JobLabels {
+    /// The key alone.
+    ///
+    /// # Errors
+    /// `Malformed`.
+    pub fn of_headers(headers: &HeaderMap) -> Result<Self, RequestError> {
+        let mut keys = headers.get_all(IDEMPOTENCY_KEY).iter();
+        let key = match (keys.next(), keys.next()) {
+            (None, _) => None,
+            (Some(key), None) => Some(checked_key(key)?),
+            (Some(_), Some(_)) => {
+                return Err(malformed("the header `idempotency-key` comes twice"));
+            }
+        };
+        Ok(Self {
+            key,
+            ..Self::default()
+        })
+    }
+
+    /// The key, and what the URL's query says.
+    ///
+    /// # Errors
+    /// `Malformed`.
+    pub fn of(headers: &HeaderMap, query: Option<&str>) -> Result<Self, RequestError> {
+        let mut labels = Self::of_headers(headers)?;
+        for (name, value) in form_urlencoded::parse(query.unwrap_or_default().as_bytes()) {
+            match name.as_ref() {
+                "name" => labels.name = Some(checked_name(&value)?),
+                "priority" => labels.priority = checked_priority(&value)?,
+                other => {
+                    return Err(malformed(&format!(
+                        "`{}` is not known; the URL's query has `name` and `priority`",
+                        excerpt(other)
+                    )));
+                }
+            }
+        }
+        Ok(labels)
+    }
+
+    /// A submission of a client.
+    pub fn submission(self, client: Client, request: &JobRequest) -> Submission {
+        Submission {
+            client: client.map_or_else(String::new, |address| address.0.to_string()),
+            idempotency_key: self.key,
+            name: self.name,
+            priority: self.priority,
+            webhook: None,
+            request: request.text(),
+        }
+    }
+}
+
+fn checked_key(value: &HeaderValue) -> Result<String, RequestError> {
+    let key = value.to_str().unwrap_or_default();
+    let is_plain = key.bytes().all(|byte| byte.is_ascii_graphic());
+    if !is_plain || !(1..=MAX_KEY_BYTES).contains(&key.len()) {
+        return Err(malformed(&format!(
+            "the header `idempotency-key` must have 1 to {MAX_KEY_BYTES} visible ASCII characters"
+        )));
+    }
+    Ok(key.to_owned())
+}
+
+fn checked_name(name: &str) -> Result<String, RequestError> {
+    if name.chars().count() > MAX_NAME_CHARACTERS || name.chars().any(char::is_control) {
+        return Err(malformed(&format!(
+            "`name` must have at most {MAX_NAME_CHARACTERS} characters and no control characters"
+        )));
+    }
+    Ok(name.to_owned())
+}
+
+fn checked_priority(text: &str) -> Result<i64, RequestError> {
+    match text.parse() {
+        Ok(priority) if (-MAX_PRIORITY..=MAX_PRIORITY).contains(&priority) => Ok(priority),
+        _ => Err(malformed(&format!(
+            "`priority` must be a whole number from -{MAX_PRIORITY} to {MAX_PRIORITY}"
+        ))),
+    }
+}
+
+fn malformed(detail: &str) -> RequestError {
+    RequestError::Malformed(detail.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_are_checked() {
+        let headers = |keys: &[&str]| {
+            let mut headers = HeaderMap::new();
+            for key in keys {
+                headers.append(IDEMPOTENCY_KEY, HeaderValue::from_str(key).unwrap());
+            }
+            headers
+        };
+        let query = "name=Coat%20no.%207+left&priority=-3";
+        let labels = JobLabels::of(&headers(&["a-1"]), Some(query)).unwrap();
+        assert_eq!(labels.key.as_deref(), Some("a-1"));
+        assert_eq!(labels.name.as_deref(), Some("Coat no. 7 left"));
+        assert_eq!(labels.priority, -3);
+        let long = "k".repeat(256);
+        for (keys, query) in [
+            (vec!["a", "b"], ""),
+            (vec![""], ""),
+            (vec!["two words"], ""),
+            (vec![long.as_str()], ""),
+            (vec![], "name=%00"),
+            (vec![], "priority=101"),
+            (vec![], "priority=high"),
+            (vec![], "colour=red"),
+        ] {
+            let refused = JobLabels::of(&headers(&keys), Some(query)).unwrap_err();
+            assert_eq!(refused.code().status, 400, "{keys:?} {query}");
+        }
+    }
+
+    #[test]
+    fn constraints_are_kept_as_they_came() {
+        let text = br#"{"anchors": [{"position": [0.1, 1e-300, 3]}], "except": [2], "up": [0, 1, 0], "holes": [{"border": "auto"}]}"#;
+        let kept = KeptConstraints::parse(text).unwrap();
+        let request = JobRequest::new(Some(kept), ScanForm::Glb);
+        let read = JobRequest::read(&request.text()).unwrap();
+        assert_eq!(
+            read.constraints().unwrap(),
+            Constraints::parse(text).unwrap()
+        );
+        assert_eq!(read.form(), ScanForm::Glb);
+    }
+}

@@ -1,0 +1,284 @@
+//! The HTTP routes of jobs: a scan is handed over, its result is fetched later.
+
+use std::{sync::Arc, time::Duration};
+
+use axum::{
+    Router,
+    extract::{FromRequestParts, Path, Request, State},
+    http::{HeaderMap, StatusCode, Uri, header, request::Parts},
+    response::{IntoResponse, Response},
+    routing::{get, post},
+};
+use darn_jobs::{Job, Jobs, ListQuery, State as JobState};
+use tokio::{
+    select,
+    time::{Instant, sleep_until},
+};
+use uuid::Uuid;
+
+use super::{
+    app::App,
+    body::{self, ScanRequest},
+    error::RequestError,
+    job_answer, job_events,
+    job_message::{message, problem_document},
+    job_request::{JobLabels, JobRequest, KeptConstraints},
+    media_types::{JSON, PROBLEM_JSON},
+    prefer::{PREFERENCE_APPLIED, Preferences},
+    response,
+    telemetry::RequestId,
+};
+use darn_contract::{excerpt, v1};
+
+/// Jobs of a page, where the query does not say.
+const DEFAULT_LIMIT: u32 = 50;
+/// Most jobs of a page.
+const MAX_LIMIT: u32 = 200;
+
+/// The routes below `/jobs`.
+pub fn routes() -> Router<Arc<App>> {
+    Router::new()
+        .route("/jobs", post(submit).get(list))
+        .route("/jobs/{id}", get(describe).delete(delete))
+        .route("/jobs/{id}/result", get(result))
+        .route("/jobs/{id}/report", get(report))
+        .route("/jobs/{id}/events", get(events))
+        .route("/jobs/{id}/cancel", post(cancel))
+        .route("/jobs/{id}/retry", post(retry))
+}
+
+/// The jobs of a service that keeps some.
+struct KeptJobs(Arc<Jobs>);
+
+impl FromRequestParts<Arc<App>> for KeptJobs {
+    type Rejection = RequestError;
+
+    async fn from_request_parts(_: &mut Parts, app: &Arc<App>) -> Result<Self, RequestError> {
+        app.jobs.clone().map(Self).ok_or(RequestError::JobsNotKept)
+    }
+}
+
+/// The job id in a path.
+struct JobId(Uuid);
+
+impl<S: Send + Sync> FromRequestParts<S> for JobId {
+    type Rejection = RequestError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, RequestError> {
+        // A text that is not an id is an unknown job.
+        let Ok(Path(text)) = Path::<String>::from_request_parts(parts, state).await else {
+            return Err(RequestError::NoSuchJob);
+        };
+        let id = Uuid::try_parse(&text).map_err(|_| RequestError::NoSuchJob)?;
+        Ok(Self(id))
+    }
+}
+
+async fn submit(State(app): State<Arc<App>>, request: Request) -> Result<Response, RequestError> {
+    let labels = JobLabels::of(request.headers(), request.uri().query());
+    let jobs = app.jobs.as_ref().ok_or(RequestError::JobsNotKept);
+    let job = match (jobs, labels) {
+        (Ok(jobs), Ok(labels)) => hand_over(&app, jobs, request, labels).await?,
+        (Err(error), _) | (_, Err(error)) => {
+            body::discard(request, &app.limits);
+            return Err(error);
+        }
+    };
+    Ok(accepted(&job))
+}
+
+/// `POST /inpaint` of a client that prefers a job: waits as long as it allows, then answers with the job.
+///
+/// # Errors
+/// Those of receiving the request, and of the jobs.
+pub async fn inpaint_later(
+    app: &App,
+    jobs: &Jobs,
+    request: Request,
+    preferences: Preferences,
+) -> Result<Response, RequestError> {
+    let headers = request.headers().clone();
+    let id = request.extensions().get::<RequestId>().cloned();
+    let labels = match JobLabels::of_headers(&headers) {
+        Ok(labels) => labels,
+        Err(error) => {
+            body::discard(request, &app.limits);
+            return Err(error);
+        }
+    };
+    let job = hand_over(app, jobs, request, labels).await?;
+    let wait = preferences.wait.unwrap_or_default();
+    let job = finished_within(app, jobs, job, wait.min(app.limits.deadline)).await?;
+    let mut answer = match job.state {
+        JobState::Done => {
+            let mut answer = job_answer::result(app, jobs, job.id, &headers).await?;
+            let path = format!("/jobs/{}/result", job.id).try_into();
+            (answer.headers_mut()).extend(path.map(|path| (header::CONTENT_LOCATION, path)));
+            answer
+        }
+        JobState::Error => failed(&job, id),
+        JobState::Waiting | JobState::Running | JobState::Cancelled => accepted(&job),
+    };
+    let applied = preferences.applied();
+    answer.headers_mut().insert(PREFERENCE_APPLIED, applied);
+    Ok(answer)
+}
+
+/// Receives a scan and makes its job, or finds that of an earlier request with the same key.
+async fn hand_over(
+    app: &App,
+    jobs: &Jobs,
+    request: Request,
+    labels: JobLabels,
+) -> Result<Job, RequestError> {
+    let headers = request.headers().clone();
+    let ScanRequest {
+        scan,
+        files,
+        parameters,
+        upload,
+    } = body::receive_job_scan::<KeptConstraints>(app, request).await?;
+    let asked = JobRequest::new(parameters, files.answer(&headers).form);
+    let submission = labels.submission(upload.client(), &asked);
+    let job = jobs.submit(submission, &scan[..]).await?.into_job();
+    drop(upload);
+    Ok(job)
+}
+
+/// The job once it is finished, or as it is after this time or when the service shuts down.
+async fn finished_within(
+    app: &App,
+    jobs: &Jobs,
+    mut job: Job,
+    wait: Duration,
+) -> Result<Job, RequestError> {
+    let end = Instant::now() + wait;
+    while !job.state.is_finished() {
+        select! {
+            changed = jobs.changed_since(job.id, job.version) => job = changed?,
+            () = sleep_until(end) => break,
+            () = app.stopping.cancelled() => break,
+        }
+    }
+    Ok(job)
+}
+
+/// The answer of a job that was handed over.
+fn accepted(job: &Job) -> Response {
+    let headers = [
+        (header::CONTENT_TYPE, JSON.to_owned()),
+        (header::CACHE_CONTROL, "no-store".to_owned()),
+        (header::LOCATION, format!("/jobs/{}", job.id)),
+    ];
+    (StatusCode::ACCEPTED, headers, response::json(&message(job))).into_response()
+}
+
+/// The problem document of a job that has failed, as the answer of this request.
+fn failed(job: &Job, request: Option<RequestId>) -> Response {
+    let Some((status, mut document)) = problem_document(job) else {
+        return RequestError::Internal.into_response();
+    };
+    if let Some(request) = request {
+        document["request_id"] = request.0.into();
+    }
+    let headers = [
+        (header::CONTENT_TYPE, PROBLEM_JSON),
+        (header::CACHE_CONTROL, "no-store"),
+    ];
+    (status, headers, response::json(&document)).into_response()
+}
+
+async fn list(KeptJobs(jobs): KeptJobs, uri: Uri) -> Result<Response, RequestError> {
+    let page = jobs.list(&list_query(uri.query())?).await?;
+    Ok(response::json_response(response::json(&v1::JobList {
+        jobs: page.jobs.iter().map(message).collect(),
+        next: page.next.map(|number| number.to_string()),
+    })))
+}
+
+fn list_query(query: Option<&str>) -> Result<ListQuery, RequestError> {
+    let mut wanted = ListQuery {
+        client: None,
+        state: None,
+        before: None,
+        limit: DEFAULT_LIMIT,
+    };
+    let wrong = |detail: String| Err(RequestError::Malformed(detail));
+    for (name, value) in form_urlencoded::parse(query.unwrap_or_default().as_bytes()) {
+        match name.as_ref() {
+            "state" => match value.to_ascii_lowercase().parse() {
+                Ok(state) => wanted.state = Some(state),
+                Err(_) => {
+                    return wrong(format!(
+                        "`{}` is no state of a job; the states are waiting, running, done, error and cancelled",
+                        excerpt(&value)
+                    ));
+                }
+            },
+            "from" => match value.parse() {
+                Ok(number) => wanted.before = Some(number),
+                Err(_) => return wrong("`from` must be the `next` of another page".to_owned()),
+            },
+            "limit" => match value.parse() {
+                Ok(limit @ 1..=MAX_LIMIT) => wanted.limit = limit,
+                _ => {
+                    return wrong(format!(
+                        "`limit` must be a whole number from 1 to {MAX_LIMIT}"
+                    ));
+                }
+            },
+            other => {
+                return wrong(format!(
+                    "`{}` is not known; the URL's query has `state`, `from` and `limit`",
+                    excerpt(other)
+                ));
+            }
+        }
+    }
+    Ok(wanted)
+}
+
+async fn describe(KeptJobs(jobs): KeptJobs, JobId(id): JobId) -> Result<Response, RequestError> {
+    Ok(described(&jobs.get(id).await?))
+}
+
+async fn result(
+    State(app): State<Arc<App>>,
+    KeptJobs(jobs): KeptJobs,
+    JobId(id): JobId,
+    headers: HeaderMap,
+) -> Result<Response, RequestError> {
+    job_answer::result(&app, &jobs, id, &headers).await
+}
+
+async fn report(KeptJobs(jobs): KeptJobs, JobId(id): JobId) -> Result<Response, RequestError> {
+    job_answer::report(&jobs, id).await
+}
+
+async fn events(
+    State(app): State<Arc<App>>,
+    KeptJobs(jobs): KeptJobs,
+    JobId(id): JobId,
+    headers: HeaderMap,
+) -> Result<Response, RequestError> {
+    let job = jobs.get(id).await?;
+    let stopping = app.stopping.clone();
+    Ok(job_events::answer(&jobs, job, &headers, stopping))
+}
+
+async fn cancel(KeptJobs(jobs): KeptJobs, JobId(id): JobId) -> Result<Response, RequestError> {
+    Ok(described(&jobs.cancel(id).await?))
+}
+
+async fn retry(KeptJobs(jobs): KeptJobs, JobId(id): JobId) -> Result<Response, RequestError> {
+    Ok(described(&jobs.retry(id).await?))
+}
+
+async fn delete(KeptJobs(jobs): KeptJobs, JobId(id): JobId) -> Result<StatusCode, RequestError> {
+    jobs.delete(id).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+fn described(job: &Job) -> Response {
+    response::json_response(response::json(&message(job)))
+}
