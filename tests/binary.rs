@@ -19,8 +19,14 @@ struct Service {
 impl Service {
     /// Starts on a free port and waits until the log says which.
     fn start() -> Service {
+        Service::start_with(&[])
+    }
+
+    /// The same with settings.
+    fn start_with(settings: &[&str]) -> Service {
         let mut child = darn()
             .args(["serve", "--listen", "127.0.0.1:0"])
+            .args(settings)
             .stderr(Stdio::piped())
             .stdout(Stdio::null())
             .spawn()
@@ -45,6 +51,12 @@ impl Service {
 
     fn url(&self, path: &str) -> String {
         format!("http://{}{path}", self.address)
+    }
+
+    /// A job, by its path.
+    async fn job(&self, client: &reqwest::Client, path: &str) -> serde_json::Value {
+        let answer = client.get(self.url(path)).send().await.expect("an answer");
+        answer.json().await.expect("JSON")
     }
 }
 
@@ -122,6 +134,69 @@ async fn the_service_and_the_command_give_the_same_bytes_and_sigterm_ends_it() {
         service.child.wait().expect("it ends").success(),
         "SIGTERM is a clean end"
     );
+}
+
+#[tokio::test]
+async fn jobs_outlive_a_process_that_is_killed_and_end_as_requests_do() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let data = ["--data", folder.path().to_str().expect("a name")];
+    let client = reqwest::Client::new();
+    let post = |service: &Service, path: &str| {
+        let request = client.post(service.url(path));
+        let request = request.header("content-type", "model/gltf-binary");
+        request.body(EXAMPLE).send()
+    };
+    let mut first = Service::start_with(&data);
+    let mut jobs = Vec::new();
+    for _ in 0..4 {
+        let answer = post(&first, "/jobs").await.expect("an answer");
+        assert_eq!(answer.status(), 202);
+        jobs.push(
+            answer.headers()["location"]
+                .to_str()
+                .expect("a path")
+                .to_owned(),
+        );
+    }
+    for path in jobs.iter().cycle() {
+        if first.job(&client, path).await["state"] == "RUNNING" {
+            break;
+        }
+    }
+    first.child.kill().expect("killed");
+    first.child.wait().expect("it ends");
+
+    let second = Service::start_with(&data);
+    let mut attempts = Vec::new();
+    for path in &jobs {
+        let begun = std::time::Instant::now();
+        let done = loop {
+            let job = second.job(&client, path).await;
+            if job["state"] == "DONE" {
+                break job;
+            }
+            let is_underway = job["state"] == "WAITING" || job["state"] == "RUNNING";
+            assert!(is_underway && begun.elapsed().as_secs() < 60, "{job}");
+            tokio::time::sleep(std::time::Duration::from_millis(20)).await;
+        };
+        attempts.push(done["attempt"].as_u64());
+    }
+    assert!(
+        attempts.contains(&Some(2)),
+        "none was broken off: {attempts:?}"
+    );
+    let request = post(&second, "/inpaint").await.expect("an answer");
+    let digest = request.headers()["repr-digest"].clone();
+    let expected = request.bytes().await.expect("a body");
+    for path in &jobs {
+        let result = client
+            .get(second.url(&format!("{path}/result")))
+            .send()
+            .await;
+        let result = result.expect("an answer");
+        assert_eq!(result.headers()["repr-digest"], digest);
+        assert!(result.bytes().await.expect("a body") == expected, "{path}");
+    }
 }
 
 #[test]

@@ -26,6 +26,8 @@ pub enum Behaviour {
     TakeTime,
     /// Succeeds once [`FakeMender::release`] is called.
     Hold,
+    /// Goes on until its budget says that it is cancelled.
+    UntilCancelled,
     Panic,
     RefuseTruncated,
     RefuseHuge,
@@ -36,10 +38,11 @@ pub enum Behaviour {
 }
 
 impl Behaviour {
-    const ALL: [Behaviour; 9] = [
+    const ALL: [Behaviour; 10] = [
         Behaviour::Mend,
         Behaviour::TakeTime,
         Behaviour::Hold,
+        Behaviour::UntilCancelled,
         Behaviour::Panic,
         Behaviour::RefuseTruncated,
         Behaviour::RefuseHuge,
@@ -56,7 +59,9 @@ impl Behaviour {
     fn refusal(self) -> Option<Refusal> {
         let code = |word, like: Code| Code { word, ..like };
         let refusal = match self {
-            Self::Mend | Self::TakeTime | Self::Hold | Self::Panic => return None,
+            Self::Mend | Self::TakeTime | Self::Hold | Self::UntilCancelled | Self::Panic => {
+                return None;
+            }
             Self::RefuseTruncated => Refusal::new(
                 code("truncated", codes::NOT_A_GLTF),
                 "chunk 1 ends at byte 90 of 80",
@@ -389,9 +394,15 @@ impl Mender for FakeMender {
         &self,
         scan: Bytes,
         constraints: &Constraints,
-        _: &Budget<'_>,
+        budget: &Budget<'_>,
     ) -> Result<Mended, Refusal> {
-        self.act_on_scan(&scan)?;
+        let scan_read = self.act_on_scan(&scan)?;
+        if scan_read.behaviour == Behaviour::UntilCancelled {
+            while budget.check().is_ok() {
+                std::thread::sleep(Duration::from_millis(2));
+            }
+            return Err(Refusal::new(codes::DEADLINE_EXCEEDED, "cancelled"));
+        }
         Ok(Mended {
             bytes: mended(&scan),
             media_type: "model/gltf-binary",

@@ -7,6 +7,7 @@ mod every_request;
 mod fake;
 mod faults;
 mod harness;
+mod jobs;
 mod load;
 mod logs;
 mod openapi;

@@ -13,6 +13,7 @@ use super::{
     response, schema,
 };
 
+mod jobs;
 mod sessions;
 
 /// The document's text, as served at `/openapi.json`.
@@ -49,6 +50,13 @@ pub fn document() -> Value {
             "/sessions/{id}/inpaint": { "post": sessions::inpaint() },
             "/sessions/{id}/optimize-anchor": { "post": sessions::optimize_anchor() },
             "/sessions/{id}/result": { "get": sessions::result() },
+            "/jobs": { "get": jobs::list(), "post": jobs::submit() },
+            "/jobs/{id}": { "get": jobs::describe(), "delete": jobs::delete() },
+            "/jobs/{id}/result": { "get": jobs::result() },
+            "/jobs/{id}/report": { "get": jobs::report() },
+            "/jobs/{id}/events": { "get": jobs::events() },
+            "/jobs/{id}/cancel": { "post": jobs::cancel() },
+            "/jobs/{id}/retry": { "post": jobs::retry() },
             "/livez": { "get": probe("Whether the process runs", &[]) },
             "/readyz": { "get": probe("Whether the service mends: warmed up and not shutting down", &[503]) },
             "/metrics": { "get": probe("Metrics in Prometheus text format", &[]) },
@@ -67,9 +75,10 @@ pub fn document() -> Value {
 }
 
 fn inpaint() -> Value {
-    json!({
+    let mut inpaint = json!({
         "summary": "Fill the holes of a scan",
         "operationId": "inpaint",
+        "parameters": jobs::preferences(),
         "requestBody": body(&[("constraints", "Constraints")], &[]),
         "responses": responses(
             "200",
@@ -83,7 +92,9 @@ fn inpaint() -> Value {
             "A scan or constraints that cannot be mended; `errors` names the constraints. With code `no_holes`: the scan has no \
                 hole to fill",
         ),
-    })
+    });
+    inpaint["responses"]["202"] = jobs::accepted();
+    inpaint
 }
 
 fn optimize_anchor() -> Value {
@@ -320,6 +331,7 @@ fn info_schema() -> Value {
         "description": "The version, and the limits that a client can check before it sends a scan",
         "properties": {
             "version": { "type": "string", "description": "darn's version" },
+            "jobs": { "type": "boolean", "description": "Whether the service keeps jobs: whether it was started with `--data`" },
             "limits": {
                 "type": "object",
                 "properties": {
@@ -330,6 +342,6 @@ fn info_schema() -> Value {
                 "required": ["bodyBytes", "deadlineSeconds", "sessionIdleSeconds"],
             },
         },
-        "required": ["version", "limits"],
+        "required": ["version", "jobs", "limits"],
     })
 }

@@ -233,3 +233,37 @@ async fn one_client_cannot_take_every_place() {
     drop(flood);
     assert!(pool.reserve(client(1)).is_ok());
 }
+
+#[tokio::test]
+async fn a_job_has_a_turn_while_a_worker_is_idle_and_one_in_any_case() {
+    let pool = pool(2, 2);
+    let places: Vec<_> = (0..3).map(|_| pool.reserve(None).unwrap()).collect();
+    // More requests than workers: jobs keep one turn all the same.
+    let first = pool.job_turn().await;
+    let mut second = Box::pin(pool.job_turn());
+    assert!(poll_once(&mut second).await.is_none());
+    assert!(
+        poll_once(&mut Box::pin(first.needed_by_requests()))
+            .await
+            .is_none()
+    );
+    drop(places);
+    let second = second.await;
+    assert!(
+        poll_once(&mut Box::pin(second.needed_by_requests()))
+            .await
+            .is_none()
+    );
+    // A request needs the worker of the second one.
+    let _place = pool.reserve(None).unwrap();
+    second.needed_by_requests().await;
+    drop(second);
+    assert!(
+        poll_once(&mut Box::pin(first.needed_by_requests()))
+            .await
+            .is_none()
+    );
+    let answer = pool.run_job(first, by(soon()), |_| 7).await;
+    assert_eq!(answer, Ok(7));
+    pool.job_turn().await;
+}
