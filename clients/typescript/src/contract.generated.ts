@@ -161,6 +161,133 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/jobs": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** List jobs */
+        get: operations["listJobs"];
+        put?: never;
+        /**
+         * Hand over a scan to be mended later
+         * @description When this is answered, the scan is on disk and its job outlives the process. The form of the result follows `Accept` as that of /inpaint does
+         */
+        post: operations["submitJob"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/jobs/{id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** Describe a job */
+        get: operations["describeJob"];
+        put?: never;
+        post?: never;
+        /** Delete a job in any state, with its files */
+        delete: operations["deleteJob"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/jobs/{id}/result": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The mended scan of a job */
+        get: operations["jobResult"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/jobs/{id}/report": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The report of a job's mend */
+        get: operations["jobReport"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/jobs/{id}/events": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * The changes of a job as server-sent events
+         * @description An event `job` for the present state and for each change; its `id` is the job's `version`, its data the job as JSON. The stream ends once the job is finished; a comment every 15 seconds keeps it open
+         */
+        get: operations["jobEvents"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/jobs/{id}/cancel": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** Cancel a job that waits or runs */
+        post: operations["cancelJob"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/jobs/{id}/retry": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** Let a failed or cancelled job wait again */
+        post: operations["retryJob"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/livez": {
         parameters: {
             query?: never;
@@ -855,11 +982,93 @@ export interface components {
             /** @description Its texture. */
             texture?: number;
         };
+        /** @description A scan that was handed over to be mended later. It survives the process that took it. */
+        Job: {
+            /** @description Names it in paths. */
+            id?: string;
+            /** @description The client's name for it. */
+            name?: string;
+            /** @description Of a client's jobs those with a higher priority start first. */
+            priority?: number;
+            /** @description Where it is in its life. */
+            state?: components["schemas"]["JobState"];
+            /** @description What is done now: `waiting`, `reading`, `mending` or `writing`; empty once it is finished. */
+            stage?: string;
+            /** @description Starts at 1 and grows with every change; the `id` of its events. */
+            version?: number;
+            /** @description Attempts so far. A second one follows when the process of the first one ended; those that a shutdown broke off do not count. */
+            attempt?: number;
+            /** @description Whether a running job is to stop. */
+            cancelling?: boolean;
+            /**
+             * Format: date-time
+             * @description When it was handed over.
+             */
+            createdAt?: string;
+            /**
+             * Format: date-time
+             * @description When it last changed.
+             */
+            changedAt?: string;
+            /**
+             * Format: date-time
+             * @description When its last attempt began.
+             */
+            startedAt?: string;
+            /**
+             * Format: date-time
+             * @description When it became done, failed or was cancelled.
+             */
+            finishedAt?: string;
+            /**
+             * Format: date-time
+             * @description When its files were deleted because of their age or the space they took.
+             */
+            expiredAt?: string;
+            /** @description Path of the mended scan, once there is one. */
+            result?: string;
+            /** @description Path of its report, once there is one. */
+            report?: string;
+            /** @description How it went, once it is done: `filled=3 skipped=1 doubtful=0`. */
+            outcome?: string;
+            /** @description Why it failed. */
+            problem?: components["schemas"]["JobProblem"];
+        };
+        /** @description Why a job failed: what the problem document of the synchronous request says. */
+        JobProblem: {
+            /** @description The status that the request would have been answered with. */
+            status?: number;
+            /** @description Stable word for programs. */
+            code?: string;
+            /** @description What, where and which limit, for a person. */
+            detail?: string;
+            /** @description The fields at fault of the constraints. */
+            errors?: components["schemas"]["JobFault"][];
+        };
+        /** @description A field at fault. */
+        JobFault: {
+            /** @description JSON pointer (RFC 6901) into the constraints; empty when they are at fault as a whole. */
+            pointer?: string;
+            /** @description What is wrong, for a person. */
+            detail?: string;
+        };
+        /** @description A page of jobs, the newest first. */
+        JobList: {
+            /** @description The jobs. */
+            jobs?: components["schemas"]["Job"][];
+            /** @description The parameter `from` of the next page; left out on the last one. */
+            next?: string;
+        };
         /**
          * @description What a boundary loop is.
          * @enum {string}
          */
         LoopKind: "LOOP_KIND_UNSPECIFIED" | "HOLE" | "OUTER_BOUNDARY" | "TUBE_END" | "OPENING";
+        /**
+         * @description Where a job is in its life.
+         * @enum {string}
+         */
+        JobState: "JOB_STATE_UNSPECIFIED" | "WAITING" | "RUNNING" | "DONE" | "ERROR" | "CANCELLED";
         /** @description A problem document (RFC 9457) */
         Problem: {
             /** @constant */
@@ -883,11 +1092,13 @@ export interface components {
          * @description The words of this version; later ones may have more
          * @enum {string}
          */
-        ProblemCode: "empty_body" | "malformed_request" | "digest_mismatch" | "no_query" | "not_found" | "method_not_allowed" | "body_timeout" | "body_too_large" | "message_too_large" | "constraints_too_large" | "query_too_large" | "unsupported_content_encoding" | "unsupported_media_type" | "invalid_constraints" | "invalid_query" | "session_not_found" | "session_expired" | "session_evicted" | "session_deleted" | "session_too_large" | "session_busy" | "sessions_full" | "internal" | "queue_full" | "memory_full" | "uploads_full" | "draining" | "warming_up" | "deadline_exceeded" | "not_a_gltf" | "invalid_gltf" | "scan_too_large" | "index_out_of_range" | "position_not_finite" | "unsupported_extension" | "external_data" | "no_triangles" | "singular_transform" | "constraints_do_not_fit" | "anchor_out_of_reach" | "too_much_work" | "too_much_memory" | "answer_too_large" | "no_holes" | "nothing_to_strip" | "too_many_holes" | "non_manifold_rim" | "coordinates_too_large" | "not_a_disk" | "not_cloth_like" | "too_little_known" | "rim_crosses_itself" | "patch_degenerate" | "no_plausible_fill" | "hole_too_narrow";
+        ProblemCode: "empty_body" | "malformed_request" | "digest_mismatch" | "no_query" | "not_found" | "method_not_allowed" | "body_timeout" | "body_too_large" | "message_too_large" | "constraints_too_large" | "query_too_large" | "unsupported_content_encoding" | "unsupported_media_type" | "invalid_constraints" | "invalid_query" | "session_not_found" | "session_expired" | "session_evicted" | "session_deleted" | "session_too_large" | "session_busy" | "sessions_full" | "jobs_not_kept" | "no_such_job" | "job_unfinished" | "job_wrong_state" | "job_expired" | "idempotency_mismatch" | "job_crashed_worker" | "storage_full" | "internal" | "queue_full" | "memory_full" | "uploads_full" | "draining" | "warming_up" | "deadline_exceeded" | "not_a_gltf" | "invalid_gltf" | "scan_too_large" | "index_out_of_range" | "position_not_finite" | "unsupported_extension" | "external_data" | "no_triangles" | "singular_transform" | "constraints_do_not_fit" | "anchor_out_of_reach" | "too_much_work" | "too_much_memory" | "answer_too_large" | "no_holes" | "nothing_to_strip" | "too_many_holes" | "non_manifold_rim" | "coordinates_too_large" | "not_a_disk" | "not_cloth_like" | "too_little_known" | "rim_crosses_itself" | "patch_degenerate" | "no_plausible_fill" | "hole_too_narrow";
         /** @description The version, and the limits that a client can check before it sends a scan */
         Info: {
             /** @description darn's version */
             version: string;
+            /** @description Whether the service keeps jobs: whether it was started with `--data` */
+            jobs: boolean;
             limits: {
                 /** @description Most bytes of a request's body */
                 bodyBytes: number;
@@ -909,7 +1120,12 @@ export interface operations {
     inpaint: {
         parameters: {
             query?: never;
-            header?: never;
+            header?: {
+                /** @description `respond-async`: a job is made, and answered with (202) unless the mend ends within `wait=N` seconds (RFC 7240). Passed over by a service that keeps no jobs */
+                prefer?: string;
+                /** @description A repeated request with the same key and payload is answered with the first one's job; keys of different client addresses are apart */
+                "idempotency-key"?: string;
+            };
             path?: never;
             cookie?: never;
         };
@@ -950,6 +1166,17 @@ export interface operations {
                         report?: components["schemas"]["Report"];
                         scan?: unknown;
                     };
+                };
+            };
+            /** @description The job */
+            202: {
+                headers: {
+                    /** @description The job's path */
+                    location?: string;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Job"];
                 };
             };
             /** @description Not readable: an empty or broken body, one that is not what its digest says, not a glTF, no query where one is needed, what is asked not JSON */
@@ -1950,6 +2177,478 @@ export interface operations {
             };
             /** @description Waiting and mending took longer than the deadline */
             504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    listJobs: {
+        parameters: {
+            query?: {
+                /** @description Only jobs in this state */
+                state?: "waiting" | "running" | "done" | "error" | "cancelled";
+                /** @description The `next` of the page before */
+                from?: string;
+                /** @description Most jobs of the page */
+                limit?: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description A page of jobs, the newest first */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobList"];
+                };
+            };
+            /** @description A parameter that cannot be read */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description With code `jobs_not_kept`: the service was started without `--data` */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    submitJob: {
+        parameters: {
+            query?: {
+                /** @description The client's name for the job */
+                name?: string;
+                /** @description Of a client's jobs those with a higher priority start first */
+                priority?: number;
+            };
+            header?: {
+                /** @description A repeated request with the same key and payload is answered with the first one's job; keys of different client addresses are apart */
+                "idempotency-key"?: string;
+            };
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "model/gltf-binary": unknown;
+                "model/gltf+json": unknown;
+                "application/zip": unknown;
+                "application/octet-stream": unknown;
+                "multipart/form-data": {
+                    /** @description GLB; glTF, with further parts for the files that it refers to, each named by its URI in the glTF; or a zip with a glTF and its files */
+                    scan: unknown;
+                    constraints?: components["schemas"]["Constraints"];
+                };
+            };
+        };
+        responses: {
+            /** @description The job */
+            202: {
+                headers: {
+                    /** @description The job's path */
+                    location?: string;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Job"];
+                };
+            };
+            /** @description Not readable: an empty or broken body, one that is not what its digest says, not a glTF, no query where one is needed, what is asked not JSON */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description With code `jobs_not_kept`: the service was started without `--data` */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body stopped coming */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Larger than a limit of the service; the limit is named */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description A content type or a content encoding that is not read here */
+            415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Constraints that are valid with no scan; `errors` names them. With code `idempotency_mismatch`: the key came before with another payload. What is wrong with the scan itself becomes the job's `problem` */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description An error of the service; its log has it under the request id */
+            500: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The queue is full, too many requests are being received, or the service shuts down; `retry-after` says when to come back */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The disk on which jobs are kept is full */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    describeJob: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The job */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Job"];
+                };
+            };
+            /** @description There is no job of this id, or it is forgotten; with code `jobs_not_kept`: the service was started without `--data` */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    deleteJob: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Deleted */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description There is no job of this id, or it is forgotten; with code `jobs_not_kept`: the service was started without `--data` */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    jobResult: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The mended scan, with the bytes and the headers of the answer of /inpaint. With `Accept: multipart/mixed`: the part `report` (application/json, schema Report), then the part `scan` */
+            200: {
+                headers: {
+                    /** @description Holes filled */
+                    "darn-holes-filled"?: number;
+                    /** @description How it went: `filled=3 skipped=1 doubtful=0`; skipped are holes that should have been filled and could not be */
+                    "darn-result"?: string;
+                    /** @description SHA-256 and SHA-512 of the answer's body (RFC 9530). `Content-Digest` or `Repr-Digest` of a request are checked */
+                    "repr-digest"?: string;
+                    /** @description Boundary loops left as they were */
+                    "darn-loops-skipped"?: number;
+                    /** @description Largest distance between the cloth and an anchor, those of gestures included, in the scene's unit; absent when there are none */
+                    "darn-anchor-distance"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "model/gltf-binary": unknown;
+                    "model/gltf+json": unknown;
+                    "application/zip": unknown;
+                    "multipart/mixed": {
+                        report?: components["schemas"]["Report"];
+                        scan?: unknown;
+                    };
+                };
+            };
+            /** @description There is no job of this id, or it is forgotten; with code `jobs_not_kept`: the service was started without `--data` */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no result: `job_unfinished`, or `job_wrong_state` of a job that failed or was cancelled */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The files were deleted because of their age or the space they took */
+            410: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    jobReport: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The report */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Report"];
+                };
+            };
+            /** @description There is no job of this id, or it is forgotten; with code `jobs_not_kept`: the service was started without `--data` */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description There is no result: `job_unfinished`, or `job_wrong_state` of a job that failed or was cancelled */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The files were deleted because of their age or the space they took */
+            410: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    jobEvents: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description The version seen last; only later ones are told */
+                "last-event-id"?: string;
+            };
+            path: {
+                id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The events */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/event-stream": unknown;
+                };
+            };
+            /** @description The job is finished, and the client has seen that */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description There is no job of this id, or it is forgotten; with code `jobs_not_kept`: the service was started without `--data` */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    cancelJob: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Cancelled; or, of one that runs, told to stop (`cancelling`) */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Job"];
+                };
+            };
+            /** @description There is no job of this id, or it is forgotten; with code `jobs_not_kept`: the service was started without `--data` */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The job is finished */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    retryJob: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description It waits */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Job"];
+                };
+            };
+            /** @description There is no job of this id, or it is forgotten; with code `jobs_not_kept`: the service was started without `--data` */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The job is neither failed nor cancelled */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Its scan was deleted */
+            410: {
                 headers: {
                     [name: string]: unknown;
                 };
