@@ -250,11 +250,11 @@ pub async fn serve(
     let stopped_early = !stop.is_cancelled();
     stop.cancel();
     // The jobs that run are given back, so that another start does not count their attempts.
-    if let Some(mut working) = working {
-        if time::timeout(JOBS_END, &mut working).await.is_err() {
-            warn!("jobs could not be given back; their leases will run out");
-            working.abort();
-        }
+    if let Some(mut working) = working
+        && time::timeout(JOBS_END, &mut working).await.is_err()
+    {
+        warn!("jobs could not be given back; their leases will run out");
+        working.abort();
     }
     upkeep.abort();
     drained.abort();
