@@ -57,6 +57,7 @@ mod suspects;
 mod testing;
 mod texture;
 mod texture_cloth;
+mod texture_images;
 mod timings;
 mod welded_scan;
 mod without_noise;

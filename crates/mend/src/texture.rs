@@ -4,17 +4,12 @@
 //! completion's; elsewhere, as on an atlas of islands, it gets images of its own. The chart does not change with the cloth's folds, so a
 //! session completes a hole's images once.
 
-use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use darn_budget::{Budget, Exhausted};
 use darn_contract::{TextureChoice, v1};
 use darn_geometry::mesh::Vec3;
-use darn_gltf_scan::{
-    ClothLook, DecodedImage, ImageError, NoLook, OwnTexture, PatchAppearance, PatchPrimitive,
-    ScanLimits,
-};
+use darn_gltf_scan::{ClothLook, NoLook, OwnTexture, PatchAppearance, PatchPrimitive, ScanLimits};
 use darn_texture::{
     Completion, PatchTexture, Settings, TextureError, estimated_bytes, mean_texels,
 };
@@ -24,7 +19,8 @@ use crate::addition::{DressedPatch, PatchSource};
 use crate::error::MendError;
 use crate::hole::Hole;
 use crate::hole_report::FilledHole;
-use crate::texture_cloth::{Images, TextureCloth};
+use crate::texture_cloth::TextureCloth;
+use crate::texture_images::ImageCache;
 use crate::timings::milliseconds;
 
 /// Why a patch has no images of its own where the request asks for none in particular.
@@ -319,7 +315,7 @@ impl Colouring<'_> {
             Err(reason) => return Ok(Err(continued(reason.to_string()))),
         };
         for image in look.images() {
-            if let Err(reason) = images.decode(image, self)? {
+            if let Err(reason) = images.decode(image, &self.source, self.scan_limits)? {
                 return Ok(Err(continued(reason)));
             }
         }
@@ -452,60 +448,5 @@ fn report_of(method: &str, reason: String) -> v1::TextureReport {
         method: method.to_owned(),
         reason,
         ..v1::TextureReport::default()
-    }
-}
-
-/// The images of a scan that the patches of one request need.
-#[derive(Default)]
-struct ImageCache {
-    decoded: Images,
-    /// Why an image was not decoded.
-    refused: BTreeMap<usize, String>,
-    /// The looks of the cloth around holes: mostly the same.
-    looks: Vec<Arc<ClothLook>>,
-}
-
-impl ImageCache {
-    /// The same look, if it is known.
-    fn shared(&mut self, look: ClothLook) -> Arc<ClothLook> {
-        if let Some(known) = self.looks.iter().find(|known| ***known == look) {
-            return Arc::clone(known);
-        }
-        self.looks.push(Arc::new(look));
-        Arc::clone(&self.looks[self.looks.len() - 1])
-    }
-
-    /// Decodes an image unless that was done before; `Err` inside is why it cannot be.
-    fn decode(
-        &mut self,
-        index: usize,
-        colouring: &Colouring,
-    ) -> Result<Result<(), String>, Exhausted> {
-        if self.decoded.contains_key(&index) {
-            return Ok(Ok(()));
-        }
-        if let Some(reason) = self.refused.get(&index) {
-            return Ok(Err(reason.clone()));
-        }
-        let PatchSource { scan, budget, .. } = colouring.source;
-        let reason = match scan.image(index, colouring.scan_limits, budget) {
-            Ok(image) => {
-                self.decoded.insert(index, Arc::new(image));
-                return Ok(Ok(()));
-            }
-            Err(ImageError::Exhausted(memory @ Exhausted::Memory { .. })) => {
-                format!("/images/{index}: {memory}")
-            }
-            Err(ImageError::Exhausted(exhausted)) => return Err(exhausted),
-            Err(ImageError::Unreadable(reason)) => reason,
-        };
-        self.refused.insert(index, reason.clone());
-        Ok(Err(reason))
-    }
-
-    /// Gives back the memory of the images.
-    fn release(self, budget: &Budget) {
-        let held = |image: &Arc<DecodedImage>| image.bytes_held();
-        budget.release(self.decoded.values().map(held).sum());
     }
 }
