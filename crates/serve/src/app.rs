@@ -286,7 +286,7 @@ impl App {
         Ok(UploadPermit { client, slot })
     }
 
-    /// Waits until a durable job may take a worker; see [`Pool::job_turn`].
+    /// Waits until a durable job may take a worker.
     pub async fn job_turn(&self) -> JobTurn {
         self.pool.job_turn().await
     }
