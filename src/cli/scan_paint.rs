@@ -2,6 +2,7 @@
 
 use darn_budget::Budget;
 use darn_gltf_scan::{DecodedImage, Scan, ScanLimits, TextureSource, TextureWrap};
+use darn_render::from_srgb;
 use std::collections::BTreeMap;
 
 /// The scan's base colours and emission, as a viewer has them.
@@ -78,11 +79,5 @@ fn read(image: &DecodedImage, source: &TextureSource, place: [f32; 2]) -> [f32; 
     };
     let (x, y) = (at(0, image.width), at(1, image.height));
     let [r, g, b, _] = image.texels()[y * image.width as usize + x];
-    [r, g, b].map(|c| {
-        let c = f32::from(c) / 255.0;
-        match c <= 0.04045 {
-            true => c / 12.92,
-            false => ((c + 0.055) / 1.055).powf(2.4),
-        }
-    })
+    from_srgb([r, g, b])
 }

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value};
 
+use super::append::extension_list;
 use super::scan::Scan;
 use super::texture_slots::{self, SLOTS, TextureKind};
-use super::variants::{MaterialChoices, Variants};
+use super::variants::{EXTENSION, MaterialChoices, VARIANTS, Variants, mapped_materials};
 
 /// Most layers of a patch: a scan may have many variants.
 const MOST_LAYERS: usize = 32;
@@ -154,29 +155,14 @@ impl Scan {
 
     /// The index of a variant by its name.
     pub fn variant(&self, name: &str) -> Option<usize> {
-        let names = self
-            .json
-            .pointer("/extensions/KHR_materials_variants/variants");
-        let mut names = names?.as_array()?.iter();
-        names.position(|it| it.get("name").and_then(Value::as_str) == Some(name))
+        let names = extension_list(&self.json, EXTENSION, VARIANTS)?;
+        (names.iter()).position(|it| it.get("name").and_then(Value::as_str) == Some(name))
     }
 
     /// The base colour and the emission of a part, without a variant or in one. Textures that cannot be read are left out.
     pub fn part_colours(&self, part: usize, variant: Option<usize>) -> [TextureSource; 2] {
         let part = &self.parts[part];
-        let mapped = variant.and_then(|variant| {
-            let pointer = format!(
-                "/meshes/{}/primitives/{}/extensions/KHR_materials_variants/mappings",
-                part.mesh, part.primitive
-            );
-            let mut mappings = self.json.pointer(&pointer)?.as_array()?.iter();
-            let chosen = mappings.find(|mapping| {
-                let variants = mapping.get("variants").and_then(Value::as_array);
-                let mut variants = variants.into_iter().flatten();
-                variants.any(|it| it.as_u64() == Some(variant as u64))
-            });
-            usize::try_from(chosen?.get("material")?.as_u64()?).ok()
-        });
+        let mapped = variant.and_then(|v| mapped_materials(self, part).get(&v).copied());
         let material = mapped.or(part.material);
         let object = material.and_then(|m| self.json.get("materials")?.get(m)?.as_object());
         [TextureKind::BaseColour, TextureKind::Colour].map(|kind| {

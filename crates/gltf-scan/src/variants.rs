@@ -102,23 +102,8 @@ impl Variants {
 
     /// The materials of a part of the scan.
     pub fn choices(&self, scan: &Scan, part: &ScanPart) -> MaterialChoices {
-        let pointer = format!(
-            "/meshes/{}/primitives/{}/extensions/{EXTENSION}/mappings",
-            part.mesh, part.primitive
-        );
-        let mappings = scan.json.pointer(&pointer).and_then(Value::as_array);
-        let number = |value: &Value| usize::try_from(value.as_u64()?).ok();
-        let mut mapped = BTreeMap::new();
-        for mapping in mappings.into_iter().flatten() {
-            let Some(material) = mapping.get("material").and_then(number) else {
-                continue;
-            };
-            let variants = mapping.get("variants").and_then(Value::as_array);
-            let variants = variants.into_iter().flatten().filter_map(number);
-            for variant in variants.filter(|variant| *variant < self.count) {
-                mapped.entry(variant).or_insert(material);
-            }
-        }
+        let mut mapped = mapped_materials(scan, part);
+        mapped.retain(|variant, _| *variant < self.count);
         mapped.remove(&self.blended);
         MaterialChoices {
             marked: mapped.remove(&self.marked).filter(|_| part.reconstructed),
@@ -152,4 +137,25 @@ impl Variants {
         });
         Ok(json!({ EXTENSION: { "mappings": mappings.collect::<Vec<_>>() } }))
     }
+}
+
+/// The material that each variant maps on a part, by the variant's index; where several mappings name one variant, the first.
+pub(super) fn mapped_materials(scan: &Scan, part: &ScanPart) -> BTreeMap<usize, usize> {
+    let pointer = format!(
+        "/meshes/{}/primitives/{}/extensions/{EXTENSION}/mappings",
+        part.mesh, part.primitive
+    );
+    let mappings = scan.json.pointer(&pointer).and_then(Value::as_array);
+    let number = |value: &Value| usize::try_from(value.as_u64()?).ok();
+    let mut mapped = BTreeMap::new();
+    for mapping in mappings.into_iter().flatten() {
+        let Some(material) = mapping.get("material").and_then(number) else {
+            continue;
+        };
+        let variants = mapping.get("variants").and_then(Value::as_array);
+        for variant in variants.into_iter().flatten().filter_map(number) {
+            mapped.entry(variant).or_insert(material);
+        }
+    }
+    mapped
 }

@@ -51,6 +51,7 @@ mod scan_notes;
 mod select;
 mod separate;
 mod session;
+mod sorted;
 mod strip;
 mod suspects;
 #[cfg(test)]

@@ -12,7 +12,7 @@ mod raster;
 mod shade;
 
 pub use options::{CameraDirection, EdgeLines, Framing, MAX_SIDE, PictureOptions};
-pub use shade::{CLOTH, MENDED};
+pub use shade::{CLOTH, MENDED, from_srgb};
 
 use camera::Camera;
 use darn_geometry::mesh::TriMesh;

@@ -100,7 +100,7 @@ pub(super) fn mixed(under: LinearRgb, over: LinearRgb, alpha: f32) -> LinearRgb 
 }
 
 /// An sRGB colour as linear.
-pub(super) fn from_srgb(colour: [u8; 3]) -> LinearRgb {
+pub fn from_srgb(colour: [u8; 3]) -> [f32; 3] {
     colour.map(|c| {
         let c = f32::from(c) / 255.0;
         if c <= 0.04045 {
