@@ -119,9 +119,10 @@ impl<'d> Accessor<'d> {
         self.collect(zero, read)
     }
 
-    /// All elements as unsigned integers. The caller has checked that the type is SCALAR and the component unsigned.
-    pub fn integers(&self) -> Result<Vec<u32>, ScanError> {
-        self.collect(0, |bytes| unsigned(bytes, self.component))
+    /// All elements as unsigned integers, to as many zeros. The caller has checked that the type is SCALAR and the
+    /// component unsigned.
+    pub fn integers(&self, out: &mut [u32]) -> Result<(), ScanError> {
+        self.read_into(out, |bytes| unsigned(bytes, self.component))
     }
 
     /// All elements of VEC4 as stored. The caller has checked that the type is VEC4 and the component u8 or u16.
@@ -137,11 +138,22 @@ impl<'d> Accessor<'d> {
     }
 
     fn collect<T: Copy>(&self, zero: T, read: impl Fn(&[u8]) -> T) -> Result<Vec<T>, ScanError> {
-        let mut out = match &self.base {
-            ElementSource::View(base) => base.iter().take(self.count).map(&read).collect(),
-            ElementSource::Draco(attribute) => self.collect_draco(attribute, &read)?,
-            ElementSource::Zero => vec![zero; self.count],
-        };
+        let mut out = vec![zero; self.count];
+        self.read_into(&mut out, read)?;
+        Ok(out)
+    }
+
+    /// Reads the elements that there are; the others stay.
+    fn read_into<T>(&self, out: &mut [T], read: impl Fn(&[u8]) -> T) -> Result<(), ScanError> {
+        match &self.base {
+            ElementSource::View(base) => {
+                for (slot, bytes) in out.iter_mut().zip(base.iter()) {
+                    *slot = read(bytes);
+                }
+            }
+            ElementSource::Draco(attribute) => self.read_draco(attribute, out, &read)?,
+            ElementSource::Zero => {}
+        }
         if let Some(sparse) = &self.sparse {
             for (k, (index, value)) in sparse.indices.iter().zip(sparse.values.iter()).enumerate() {
                 let index = unsigned(index, sparse.component);
@@ -157,29 +169,28 @@ impl<'d> Accessor<'d> {
                 *slot = read(value);
             }
         }
-        Ok(out)
+        Ok(())
     }
 
-    fn collect_draco<T>(
+    fn read_draco<T>(
         &self,
         attribute: &DracoAttribute<'_>,
+        out: &mut [T],
         read: impl Fn(&[u8]) -> T,
-    ) -> Result<Vec<T>, ScanError> {
+    ) -> Result<(), ScanError> {
         let mut element = [0; 16 * size_of::<f32>()];
         let size = self.component.size() * self.kind.multiplicity();
         let element = element.get_mut(..size).unwrap_or_default();
-        let points = 0..self.count;
-        points
-            .map(
-                |point| match attribute.write(point, self.component, element) {
-                    true => Ok(read(element)),
-                    false => Err(ScanError::Invalid {
-                        pointer: self.pointer.clone(),
-                        detail: format!("its Draco attribute has no value for point {point}"),
-                    }),
-                },
-            )
-            .collect()
+        for (point, slot) in out.iter_mut().enumerate() {
+            if !attribute.write(point, self.component, element) {
+                return Err(ScanError::Invalid {
+                    pointer: self.pointer.clone(),
+                    detail: format!("its Draco attribute has no value for point {point}"),
+                });
+            }
+            *slot = read(element);
+        }
+        Ok(())
     }
 }
 

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 
 use super::buffers::BufferTarget;
 use super::compressed::meshopt;
-use super::container::{Container, pack_glb, too_long};
+use super::container::{Container, pack_glb_of_pieces, too_long};
 use super::error::ScanError;
 use super::json_edit::JsonEdit;
 use super::scan::Scan;
@@ -244,18 +244,19 @@ impl<'s> Appender<'s> {
             return Ok([head, &text].concat());
         }
         let old = layout.bin.clone().and_then(|range| bytes.get(range));
+        let padding = [0; 4];
+        let pieces;
         let bin = if self.in_bin {
-            let mut bin = Vec::with_capacity(length);
-            bin.extend_from_slice(old.unwrap_or_default());
-            bin.resize(self.start, 0);
-            bin.append(&mut self.data);
-            Some(bin)
+            let old = old.unwrap_or_default();
+            let padding = padding.get(..self.start - old.len());
+            pieces = [old, padding.unwrap_or_default(), &self.data];
+            Some(pieces.as_slice())
         } else {
-            old.map(<[u8]>::to_vec)
+            old.as_ref().map(std::slice::from_ref)
         };
         let rest = bytes.get(layout.rest.clone()).unwrap_or_default();
         let mut out =
-            pack_glb(&text, bin.as_deref(), rest).ok_or_else(|| too_long(text.len() + length))?;
+            pack_glb_of_pieces(&text, bin, rest).ok_or_else(|| too_long(text.len() + length))?;
         out.extend_from_slice(bytes.get(layout.trailing.clone()).unwrap_or_default());
         Ok(out)
     }

@@ -167,33 +167,48 @@ pub(super) fn too_long(length: usize) -> ScanError {
 ///
 /// Returns `None` if the whole would not fit the format's 32-bit lengths.
 pub(super) fn pack_glb(json: &[u8], bin: Option<&[u8]>, rest: &[u8]) -> Option<Vec<u8>> {
-    let chunk = |body, fill| Chunk {
-        body,
-        length: <[u8]>::len(body).next_multiple_of(4),
+    pack_glb_of_pieces(json, bin.as_ref().map(std::slice::from_ref), rest)
+}
+
+/// [`pack_glb`] with a BIN chunk in pieces.
+pub(super) fn pack_glb_of_pieces(
+    json: &[u8],
+    bin: Option<&[&[u8]]>,
+    rest: &[u8],
+) -> Option<Vec<u8>> {
+    let chunk = |pieces, fill| Chunk {
+        pieces,
+        length: length_of(pieces).next_multiple_of(4),
         fill,
     };
-    packed(chunk(json, b' '), bin.map(|bin| chunk(bin, 0)), rest)
+    packed(chunk(&[json], b' '), bin.map(|bin| chunk(bin, 0)), rest)
 }
 
 /// A GLB of chunks that bring their own padding, if any.
 ///
 /// Returns `None` as [`pack_glb`].
 pub(super) fn glb_of_chunks(json: &[u8], bin: Option<&[u8]>, rest: &[u8]) -> Option<Vec<u8>> {
-    let chunk = |body| Chunk {
-        body,
-        length: <[u8]>::len(body),
+    let chunk = |pieces| Chunk {
+        pieces,
+        length: length_of(pieces),
         fill: 0,
     };
-    packed(chunk(json), bin.map(chunk), rest)
+    let bin = bin.as_ref().map(std::slice::from_ref);
+    packed(chunk(&[json]), bin.map(chunk), rest)
 }
 
 /// A chunk to write.
 struct Chunk<'c> {
-    body: &'c [u8],
+    /// Its body.
+    pieces: &'c [&'c [u8]],
     /// Its length, padding included.
     length: usize,
     /// The byte to pad it with.
     fill: u8,
+}
+
+fn length_of(pieces: &[&[u8]]) -> usize {
+    pieces.iter().map(|piece| piece.len()).sum()
 }
 
 fn packed(json: Chunk<'_>, bin: Option<Chunk<'_>>, rest: &[u8]) -> Option<Vec<u8>> {
@@ -208,8 +223,12 @@ fn packed(json: Chunk<'_>, bin: Option<Chunk<'_>>, rest: &[u8]) -> Option<Vec<u8
         // The cast is lossless: the length is part of `total`, which is a u32.
         out.extend_from_slice(&(chunk.length as u32).to_le_bytes());
         out.extend_from_slice(&kind.to_le_bytes());
-        out.extend_from_slice(chunk.body);
-        out.resize(out.len() + chunk.length - chunk.body.len(), chunk.fill);
+        let padding = chunk.length - length_of(chunk.pieces);
+        chunk
+            .pieces
+            .iter()
+            .for_each(|piece| out.extend_from_slice(piece));
+        out.resize(out.len() + padding, chunk.fill);
     };
     push(JSON_CHUNK, json);
     if let Some(bin) = bin {

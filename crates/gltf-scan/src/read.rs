@@ -291,19 +291,20 @@ impl<'d, 'a> ScanReader<'d, 'a> {
             }
         };
         let (start, count) = (vertices.start, vertices.len());
-        let faces = self.read_triangles(&source, mode, count)?;
+        let mut faces = self.read_triangles(&source, mode, count)?;
         self.check_used(&faces, &vertices, &position.place.pointer)?;
         let mirrored = node.transform.mirrors();
         let first = self.surface.faces.len() as u32;
-        self.surface.faces.extend(
-            faces
-                .into_iter()
-                .filter(|[a, b, c]| a != b && b != c && c != a)
-                .map(|[a, b, c]| {
-                    let [b, c] = if mirrored { [c, b] } else { [b, c] };
-                    [start + a, start + b, start + c]
-                }),
-        );
+        faces.retain(|[a, b, c]| a != b && b != c && c != a);
+        for face in &mut faces {
+            let [a, b, c] = *face;
+            let [b, c] = if mirrored { [c, b] } else { [b, c] };
+            *face = [start + a, start + b, start + c];
+        }
+        match self.surface.faces.is_empty() {
+            true => self.surface.faces = faces,
+            false => self.surface.faces.append(&mut faces),
+        }
         let normals = self.attributes.normals(&source, count)?;
         let texcoords = self.attributes.texcoords(&source, count)?;
         let (color_kinds, colors) = self.attributes.colors(&source, count)?;
@@ -379,6 +380,7 @@ impl<'d, 'a> ScanReader<'d, 'a> {
         };
         limit.check(first.saturating_add(accessor.count), &accessor.pointer)?;
         let local = accessor.floats([0.0_f32; 3])?;
+        self.surface.positions.reserve(local.len());
         for (vertex, point) in (first as u32..).zip(&local) {
             let point = node.transform.point(Vec3::from(point.map(f64::from)));
             if point.iter().all(|x| x.is_finite()) {
@@ -445,17 +447,17 @@ impl<'d, 'a> ScanReader<'d, 'a> {
                     return Err(place.invalid("indices must be unsigned scalars"));
                 }
                 self.count_faces(mode, accessor.count, &accessor.pointer)?;
-                let restart = match (mode, accessor.component) {
+                let mut list = IndexList::zeros(accessor.count);
+                accessor.integers(list.indices_mut())?;
+                list.restart = match (mode, accessor.component) {
                     (TRIANGLES, _) => None,
                     (_, ComponentType::U8) => Some(u32::from(u8::MAX)),
                     (_, ComponentType::U16) => Some(u32::from(u16::MAX)),
                     _ => Some(u32::MAX),
                 };
-                let indices = accessor.integers()?;
-                let wrong = |index: u32| index as usize >= vertices && Some(index) != restart;
-                if let Some((element, &index)) =
-                    indices.iter().enumerate().find(|(_, index)| wrong(**index))
-                {
+                let wrong = |index: u32| index as usize >= vertices && Some(index) != list.restart;
+                let mut indices = list.indices().iter().enumerate();
+                if let Some((element, &index)) = indices.find(|(_, index)| wrong(**index)) {
                     return Err(ScanError::IndexOutOfRange {
                         pointer: accessor.pointer,
                         element,
@@ -463,14 +465,14 @@ impl<'d, 'a> ScanReader<'d, 'a> {
                         vertices,
                     });
                 }
-                IndexList { indices, restart }
+                list
             }
             None => {
                 self.count_faces(mode, vertices, &place.pointer)?;
-                IndexList {
-                    indices: (0..vertices as u32).collect(),
-                    restart: None,
-                }
+                let mut list = IndexList::zeros(vertices);
+                let slots = list.indices_mut().iter_mut();
+                slots.zip(0..).for_each(|(slot, index)| *slot = index);
+                list
             }
         };
         Ok(indices.triangles(mode))

@@ -5,18 +5,42 @@ use gltf::json::mesh::{TRIANGLE_FAN, TRIANGLE_STRIP};
 /// The indices of a primitive. In strips and fans, `restart` is an index that starts a new strip or fan: glTF forbids
 /// it, but exports from other formats contain it.
 pub(super) struct IndexList {
-    pub indices: Vec<u32>,
+    /// The indices by threes; after the last of them come zeros.
+    triples: Vec<[u32; 3]>,
+    count: usize,
     pub restart: Option<u32>,
 }
 
 impl IndexList {
+    /// So many zeros, without a restart.
+    pub fn zeros(count: usize) -> Self {
+        Self {
+            triples: vec![[0; 3]; count.div_ceil(3)],
+            count,
+            restart: None,
+        }
+    }
+
+    /// The indices.
+    pub fn indices(&self) -> &[u32] {
+        &self.triples.as_flattened()[..self.count]
+    }
+
+    /// The indices, to be set.
+    pub fn indices_mut(&mut self) -> &mut [u32] {
+        &mut self.triples.as_flattened_mut()[..self.count]
+    }
+
     /// The triangles in order, degenerate ones included. `mode` is the primitive's.
-    pub fn triangles(&self, mode: u32) -> Vec<[u32; 3]> {
-        let pieces = self.indices.split(|index| Some(*index) == self.restart);
+    pub fn triangles(mut self, mode: u32) -> Vec<[u32; 3]> {
+        let pieces = (self.indices()).split(|index| Some(*index) == self.restart);
         match mode {
             TRIANGLE_STRIP => pieces.flat_map(strip).collect(),
             TRIANGLE_FAN => pieces.flat_map(fan).collect(),
-            _ => self.indices.as_chunks::<3>().0.to_vec(),
+            _ => {
+                self.triples.truncate(self.count / 3);
+                self.triples
+            }
         }
     }
 }
