@@ -103,8 +103,7 @@ pub fn mend<'a>(
         || ScanHoles::open(scan, constraints, call),
         || scan.digests(),
     );
-    let holes = holes?;
-    holes.mended(scan, holes.filled(call)?, constraints.texture, call)
+    holes?.mended_once(scan, constraints.texture, call)
 }
 
 /// Searches where on a hole's grid a point in space belongs: the cell where an anchor at that point brings the cloth

@@ -136,7 +136,8 @@ impl Cloth<'_> {
     /// The triangles of the patch on the chart.
     fn triangulated(&self, id: u32, flat: &FlatRegion, call: Call) -> Result<TimedMesh, MendError> {
         let started = Instant::now();
-        let mesh = PatchMesh::in_scan(self.whole.mesh, flat.seen(), &flat.chart, call);
+        let (mesh, blocks) = (self.whole.mesh, self.blocks);
+        let mesh = PatchMesh::in_scan(mesh, blocks, flat.seen(), &flat.chart, call);
         Ok(TimedMesh {
             mesh: mesh.map_err(MendError::patch(id))?,
             milliseconds: milliseconds(started),

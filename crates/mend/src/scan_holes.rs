@@ -27,7 +27,7 @@ use crate::welded_scan::WeldedScan;
 use darn_budget::Budget;
 use darn_contract::port::Mended;
 use darn_contract::{Constraints, FieldError, HoleSelector, Search, TextureChoice, v1};
-use darn_gltf_scan::Scan;
+use darn_gltf_scan::{PatchPrimitive, Scan};
 
 /// A scan's holes, prepared.
 pub struct ScanHoles {
@@ -69,6 +69,36 @@ pub struct ColouredPatches {
     pub texture_ms: f64,
 }
 
+/// What a request adds to a scan.
+struct ScanAdditions {
+    /// The patches, in order of id.
+    primitives: Vec<PatchPrimitive>,
+    /// The report, without what writing adds.
+    report: v1::Report,
+}
+
+impl ScanAdditions {
+    /// The mended scan; `seen` is the scan without what the request cut out.
+    ///
+    /// # Errors
+    /// When the patches cannot be written; `Exhausted`.
+    fn written(mut self, scan: &Scan, seen: &Scan, call: Call) -> Result<Mended, MendError> {
+        let started = Instant::now();
+        let written = seen.write_within(&self.primitives, call.budget)?;
+        self.report.input = Some(digests::message(scan.digests().clone()));
+        self.report.output = Some(digests::message(written.digests));
+        if let Some(timings) = &mut self.report.timings {
+            timings.write = milliseconds(started);
+            timings.total += timings.write;
+        }
+        Ok(Mended {
+            bytes: written.bytes,
+            media_type: scan.container().media_type(),
+            report: self.report,
+        })
+    }
+}
+
 impl ScanHoles {
     /// Finds the holes that a request asks for and prepares them.
     ///
@@ -90,6 +120,11 @@ impl ScanHoles {
         let selection = Selection::of(seen, &welded, constraints, call.budget)?;
         let holes = Self::prepare(welded, selection, constraints, call)?;
         Ok(ScanHoles { cut, ..holes })
+    }
+
+    /// The scan without what the request cut out, if it cuts anything out. Frees everything else.
+    fn into_cut(self) -> Option<Scan> {
+        self.cut
     }
 
     /// The scan without what the request cut out.
@@ -260,47 +295,59 @@ impl ScanHoles {
     pub fn mended(
         &self,
         scan: &Scan,
-        mut filled: FilledScan,
+        filled: FilledScan,
         texture: Option<TextureChoice>,
         call: Call,
     ) -> Result<Mended, MendError> {
+        let additions = self.additions(scan, filled, texture, call)?;
+        additions.written(scan, self.seen(scan), call)
+    }
+
+    /// The same, for holes that nothing else is asked of: their memory is free when the answer is written.
+    ///
+    /// # Errors
+    /// As [`ScanHoles::filled`] and [`ScanHoles::mended`].
+    pub fn mended_once(
+        self,
+        scan: &Scan,
+        texture: Option<TextureChoice>,
+        call: Call,
+    ) -> Result<Mended, MendError> {
+        let additions = self.additions(scan, self.filled(call)?, texture, call)?;
+        let cut = self.into_cut();
+        additions.written(scan, cut.as_ref().unwrap_or(scan), call)
+    }
+
+    /// What the filled holes add to the scan.
+    ///
+    /// # Errors
+    /// `Exhausted`.
+    fn additions(
+        &self,
+        scan: &Scan,
+        mut filled: FilledScan,
+        texture: Option<TextureChoice>,
+        call: Call,
+    ) -> Result<ScanAdditions, MendError> {
         let ColouredPatches {
             patches,
             dressed_ms,
             texture_ms,
         } = self.coloured(scan, &filled, texture, call)?;
-        let started = Instant::now();
-        let mut additions = Vec::with_capacity(patches.len());
-        let mut told = Vec::with_capacity(patches.len());
-        for ColouredPatch {
-            primitive,
-            report,
-            texture_ms,
-        } in patches
-        {
-            additions.push(primitive);
-            told.push((report, texture_ms));
-        }
-        for (hole, (report, texture_ms)) in filled.holes.iter_mut().zip(told) {
-            hole.report.texture = Some(report);
+        let mut primitives = Vec::with_capacity(patches.len());
+        for (hole, patch) in filled.holes.iter_mut().zip(patches) {
+            primitives.push(patch.primitive);
+            hole.report.texture = Some(patch.report);
             if let Some(timings) = &mut hole.report.timings {
-                timings.texture = texture_ms;
+                timings.texture = patch.texture_ms;
             }
         }
-        let written = self.seen(scan).write_within(&additions, call.budget)?;
         let mut report = self.report(scan, filled);
-        report.input = Some(digests::message(scan.digests().clone()));
-        report.output = Some(digests::message(written.digests));
         if let Some(timings) = &mut report.timings {
             timings.texture = texture_ms;
-            timings.write = milliseconds(started);
-            timings.total += dressed_ms + texture_ms + timings.write;
+            timings.total += dressed_ms + texture_ms;
         }
-        Ok(Mended {
-            bytes: written.bytes,
-            media_type: scan.container().media_type(),
-            report,
-        })
+        Ok(ScanAdditions { primitives, report })
     }
 
     /// The patches in the scan's terms, coloured as asked for.

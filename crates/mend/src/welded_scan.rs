@@ -78,7 +78,8 @@ impl WeldedScan {
         let weld = milliseconds(started);
         let started = Instant::now();
         budget.spend_at_once(LOOPS_WORK * faces as u64)?;
-        let topology = surface.topology();
+        let (topology, blocks) =
+            rayon::join(|| surface.topology(), || FaceBlocks::new(&surface.mesh));
         let loops = boundary_loops(&surface.mesh, &topology);
         let second_skins = second_skins(&surface.mesh, &loops, budget)?;
         let timings = v1::ScanTimings {
@@ -87,7 +88,7 @@ impl WeldedScan {
             ..Default::default()
         };
         let welded = WeldedScan {
-            blocks: FaceBlocks::new(&surface.mesh),
+            blocks,
             surface,
             topology,
             loops,

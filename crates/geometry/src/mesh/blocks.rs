@@ -1,5 +1,7 @@
 //! Boxes of blocks of faces: what lies near a place is found without a look at every face of a large mesh.
 
+use rayon::prelude::*;
+
 use super::TriMesh;
 use super::bounds::Bounds;
 
@@ -26,7 +28,10 @@ impl FaceBlocks {
             boxes.reduce(Bounds::merged)
         };
         FaceBlocks {
-            blocks: (0..faces).step_by(BLOCK).map(of_block).collect(),
+            blocks: (0..faces.div_ceil(BLOCK))
+                .into_par_iter()
+                .map(|block| of_block(BLOCK * block))
+                .collect(),
             faces,
         }
     }

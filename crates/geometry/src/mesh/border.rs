@@ -8,7 +8,7 @@ use rstar::{AABB, RTree};
 
 use super::Vec3;
 use super::index::HalfEdgeId;
-use super::pairing::Twins;
+use super::pairing::{Paired, Twins};
 
 /// Roundings that two vertices which were one may have gone through, in units of the coordinates' precision.
 const ROUNDINGS: f64 = 4.0;

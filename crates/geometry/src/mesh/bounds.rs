@@ -27,6 +27,17 @@ impl Bounds {
         })
     }
 
+    /// The box of some points; `None` without points.
+    pub fn of(points: &[Vec3]) -> Option<Bounds> {
+        let boxes = points.iter().map(|p| Bounds { low: *p, high: *p });
+        boxes.reduce(Bounds::merged)
+    }
+
+    /// Whether a point lies in it.
+    pub fn contains(&self, point: &Vec3) -> bool {
+        (0..3).all(|d| self.low[d] <= point[d] && point[d] <= self.high[d])
+    }
+
     /// Whether two boxes have a point in common.
     pub fn meets(&self, other: &Bounds) -> bool {
         (0..3).all(|d| self.low[d] <= other.high[d] && other.low[d] <= self.high[d])

@@ -17,9 +17,12 @@ pub fn angle_defect(mesh: &TriMesh, topology: &Topology, vertex: VertexId) -> f6
 
 /// Per face its area, scene units squared.
 pub fn face_areas(mesh: &TriMesh) -> Vec<f64> {
-    (0..mesh.faces.len())
-        .map(|f| 0.5 * doubled_normal(mesh, f).norm())
-        .collect()
+    (0..mesh.faces.len()).map(|f| face_area(mesh, f)).collect()
+}
+
+/// The area of a face, scene units squared.
+pub(super) fn face_area(mesh: &TriMesh, face: usize) -> f64 {
+    0.5 * doubled_normal(mesh, face).norm()
 }
 
 /// Per vertex the unit normal: its faces' normals weighted by their angle there (Thürmer & Wüthrich 1998). Zero where

@@ -15,7 +15,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::curvature::doubled_normal;
 use super::index::HalfEdgeId;
-use super::topology::corners_by_vertex;
+use super::pairing::{Buckets, corners_by_vertex};
 use super::{TriMesh, Vec3};
 use crate::cholesky::{SolveError, Symmetric};
 
@@ -92,22 +92,18 @@ pub fn denoise(mesh: &TriMesh, budget: &Budget) -> Result<Option<TriMesh>, Exhau
 }
 
 /// The corners at every vertex, each as the half-edge that leaves it.
-struct Incidence {
-    starts: Vec<u32>,
-    corners: Vec<HalfEdgeId>,
-}
+struct Incidence(Buckets<HalfEdgeId>);
 
 impl Incidence {
     fn of(mesh: &TriMesh) -> Incidence {
-        let (starts, corners) = corners_by_vertex(mesh.faces.as_flattened(), mesh.positions.len());
-        Incidence { starts, corners }
+        let (origins, vertices) = (mesh.faces.as_flattened(), mesh.positions.len());
+        Incidence(corners_by_vertex(origins, vertices))
     }
 
     /// The faces at a vertex, ascending.
     fn faces_at(&self, vertex: u32) -> impl Iterator<Item = u32> {
-        let v = vertex as usize;
-        let corners = &self.corners[self.starts[v] as usize..self.starts[v + 1] as usize];
-        corners.iter().map(|corner| corner.face().0)
+        let corners = self.0.get(vertex as usize).iter();
+        corners.map(|corner| corner.face().0)
     }
 
     /// The other corners of the faces at a vertex, ascending: those joined by an inner edge come twice, by a border
@@ -120,8 +116,7 @@ impl Incidence {
     }
 
     fn is_hub(&self, vertex: u32) -> bool {
-        let v = vertex as usize;
-        (self.starts[v + 1] - self.starts[v]) as usize > MOST_FACES
+        self.0.get(vertex as usize).len() > MOST_FACES
     }
 
     fn is_border(&self, mesh: &TriMesh, vertex: u32) -> bool {

@@ -6,6 +6,7 @@ use std::collections::BinaryHeap;
 use darn_budget::{Budget, Exhausted, Steps};
 
 use super::index::VertexId;
+use super::sparse::SparseValues;
 use super::topology::Topology;
 use super::{TriMesh, Vec3};
 
@@ -24,19 +25,18 @@ pub(super) fn geodesic_distance(
     sources: &[VertexId],
     limit: f64,
     budget: &Budget,
-) -> Result<Vec<f64>, Exhausted> {
+) -> Result<SparseValues<f64>, Exhausted> {
+    let vertices = mesh.positions.len();
     let mut steps = Steps::of(budget);
-    let mut distance = vec![f64::INFINITY; mesh.positions.len()];
-    let mut done = vec![false; mesh.positions.len()];
+    let mut distance = SparseValues::new(vertices, f64::INFINITY);
+    let mut done = SparseValues::new(vertices, false);
     let mut queue = BinaryHeap::new();
-    for &s in sources {
-        if let Some(d) = distance.get_mut(s.index()) {
-            *d = 0.0;
-            queue.push(Arrival {
-                distance: 0.0,
-                vertex: s,
-            });
-        }
+    for &s in sources.iter().filter(|s| s.index() < vertices) {
+        distance[s.index()] = 0.0;
+        queue.push(Arrival {
+            distance: 0.0,
+            vertex: s,
+        });
     }
     while let Some(Arrival {
         vertex,
@@ -75,10 +75,9 @@ pub(super) fn geodesic_distance(
             }
         }
     }
-    for (d, done) in distance.iter_mut().zip(done) {
-        if !done {
-            *d = f64::INFINITY;
-        }
+    let seen: Vec<usize> = distance.written().take_while(|v| *v < vertices).collect();
+    for v in seen.into_iter().filter(|v| !done[*v]) {
+        distance[v] = f64::INFINITY;
     }
     Ok(distance)
 }
@@ -151,9 +150,10 @@ mod tests {
             let source = pick.index(mesh.positions.len());
             let topology = Topology::new(&mesh);
             let distance = geodesic_distance(&mesh, &topology, &[VertexId(source as u32)], f64::INFINITY, Budget::unlimited()).unwrap();
-            for (p, d) in mesh.positions.iter().zip(&distance) {
+            for (v, p) in mesh.positions.iter().enumerate() {
+                let d = distance[v];
                 let straight = (p - mesh.positions[source]).norm();
-                prop_assert!(*d > straight - 1e-9 - 0.02 * straight && *d < 1.15 * straight + 0.5 / n as f64, "{d} {straight}");
+                prop_assert!(d > straight - 1e-9 - 0.02 * straight && d < 1.15 * straight + 0.5 / n as f64, "{d} {straight}");
             }
         }
 
@@ -162,8 +162,8 @@ mod tests {
             let mesh = sheet(n, |_, _| true, |u, v| Vec3::new(u, v, 0.0));
             let sources: Vec<VertexId> = (0..=n as u32).map(VertexId).collect();
             let distance = geodesic_distance(&mesh, &Topology::new(&mesh), &sources, f64::INFINITY, Budget::unlimited()).unwrap();
-            for (p, d) in mesh.positions.iter().zip(&distance) {
-                prop_assert!((p.y - d).abs() < 1e-9);
+            for (v, p) in mesh.positions.iter().enumerate() {
+                prop_assert!((p.y - distance[v]).abs() < 1e-9);
             }
         }
     }
@@ -179,7 +179,7 @@ mod tests {
             Budget::unlimited(),
         )
         .unwrap();
-        assert!(distance.iter().all(|d| d.is_infinite()));
+        assert!((0..mesh.positions.len()).all(|v| distance[v].is_infinite()));
     }
 
     #[test]
@@ -194,13 +194,11 @@ mod tests {
             Budget::unlimited(),
         )
         .unwrap();
-        for (near, all) in
-            geodesic_distance(&mesh, &topology, &[VertexId(3)], 0.4, Budget::unlimited())
-                .unwrap()
-                .iter()
-                .zip(all)
-        {
-            assert_eq!(*near, if all <= 0.4 { all } else { f64::INFINITY });
+        let near = geodesic_distance(&mesh, &topology, &[VertexId(3)], 0.4, Budget::unlimited());
+        let near = near.unwrap();
+        for v in 0..mesh.positions.len() {
+            let (near, all) = (near[v], all[v]);
+            assert_eq!(near, if all <= 0.4 { all } else { f64::INFINITY });
         }
     }
 }

@@ -6,6 +6,7 @@ use super::geodesic::geodesic_distance;
 use super::index::{FaceId, HalfEdgeId, LoopId, VertexId};
 use super::loops::BoundaryLoop;
 use super::region::BoundedMesh;
+use super::sparse::SparseValues;
 
 /// The smallest reach tried, in mean edge lengths of the rim's faces.
 const NARROWEST: f64 = 3.0;
@@ -13,10 +14,8 @@ const NARROWEST: f64 = 3.0;
 const POCKET: f64 = 1.5;
 /// Rounds of dropping, filling and trimming. Each round settles only what the one before changed.
 const ROUNDS: usize = 8;
-/// Nanoseconds of work a face of the whole mesh in one pass over it.
+/// Nanoseconds of work a face near the rim in one pass over them.
 const FACE_WORK: u64 = 15;
-/// Nanoseconds of work a vertex of the whole mesh in one pass over it.
-const VERTEX_WORK: u64 = 2;
 
 /// What stays the same while the reach shrinks.
 pub(super) struct Growth<'a> {
@@ -25,7 +24,7 @@ pub(super) struct Growth<'a> {
     /// The loop that the region surrounds.
     pub rim: &'a BoundaryLoop,
     /// Per vertex its distance from the rim, scene units; infinite beyond the deepest pocket.
-    pub distance: Vec<f64>,
+    pub distance: SparseValues<f64>,
     /// The smallest reach to try, scene units.
     pub narrowest: f64,
     /// The half-edges of loops near the rim, ascending, each with its loop.
@@ -33,7 +32,7 @@ pub(super) struct Growth<'a> {
     /// Faces that may belong to the region, ascending: all whose distance from the rim is known, and those that touch it.
     near: Vec<FaceId>,
     /// Per face whether it touches the rim; such faces always belong to the region.
-    touching: Vec<bool>,
+    touching: SparseValues<bool>,
 }
 
 impl<'a> Growth<'a> {
@@ -52,13 +51,12 @@ impl<'a> Growth<'a> {
             topology,
             loops,
         } = whole;
-        budget.spend(VERTEX_WORK * mesh.positions.len() as u64)?;
         let mut near: Vec<FaceId> = (rim.vertices.iter())
             .flat_map(|&v| topology.faces_at(v))
             .collect();
         near.sort_unstable();
         near.dedup();
-        let mut touching = vec![false; mesh.faces.len()];
+        let mut touching = SparseValues::new(mesh.faces.len(), false);
         let (mut length, mut count) = (0.0, 0.0);
         for f in &near {
             touching[f.index()] = true;
@@ -70,7 +68,7 @@ impl<'a> Growth<'a> {
         let limit = POCKET * reach.max(narrowest);
         let distance = geodesic_distance(mesh, topology, &rim.vertices, limit, budget)?;
         let is_near = |v: &VertexId| distance[v.index()].is_finite();
-        let vertices = (0..mesh.positions.len() as u32).map(VertexId);
+        let vertices = distance.written().map(|v| VertexId(v as u32));
         near.extend((vertices.filter(is_near)).flat_map(|v| topology.faces_at(v)));
         budget.spend(FACE_WORK * near.len() as u64)?;
         near.sort_unstable();
@@ -95,10 +93,10 @@ impl<'a> Growth<'a> {
     ///
     /// # Errors
     /// `Exhausted`.
-    pub fn inside(&self, reach: f64, budget: &Budget) -> Result<Vec<bool>, Exhausted> {
+    pub fn inside(&self, reach: f64, budget: &Budget) -> Result<SparseValues<bool>, Exhausted> {
         let round_work = FACE_WORK * self.near.len() as u64;
         budget.spend(round_work)?;
-        let mut inside = vec![false; self.whole.mesh.faces.len()];
+        let mut inside = self.no_face();
         for f in self.faces() {
             inside[f.index()] = self.touching[f.index()] || self.depth(f) <= reach;
         }
@@ -134,6 +132,11 @@ impl<'a> Growth<'a> {
             .fold(0.0, f64::max)
     }
 
+    /// None of the faces of the whole mesh.
+    fn no_face(&self) -> SparseValues<bool> {
+        SparseValues::new(self.whole.mesh.faces.len(), false)
+    }
+
     /// The faces across the edges of a face.
     fn beside(&self, face: FaceId) -> impl Iterator<Item = FaceId> {
         let twins = face.half_edges().map(|h| self.whole.topology.twin(h));
@@ -141,8 +144,8 @@ impl<'a> Growth<'a> {
     }
 
     /// Keeps only the faces that are connected with those at the rim.
-    fn drop_islands(&self, inside: &mut [bool]) {
-        let mut keep = vec![false; inside.len()];
+    fn drop_islands(&self, inside: &mut SparseValues<bool>) {
+        let mut keep = self.no_face();
         let mut stack: Vec<FaceId> = self.rim.half_edges.iter().map(|h| h.face()).collect();
         stack.retain(|f| inside[f.index()]);
         while let Some(f) = stack.pop() {
@@ -150,16 +153,16 @@ impl<'a> Growth<'a> {
                 stack.extend(self.beside(f).filter(|g| inside[g.index()]));
             }
         }
-        inside.copy_from_slice(&keep);
+        *inside = keep;
     }
 
     /// Takes in pockets: connected pieces of the rest that are no deeper than `limit` and bounded by the region and
     /// holes alone.
-    fn fill_pockets(&self, inside: &mut [bool], limit: f64) {
-        let mut seen: Vec<bool> = inside.to_vec();
+    fn fill_pockets(&self, inside: &mut SparseValues<bool>, limit: f64) {
+        let mut seen = inside.clone();
         // A piece is given up at its first face that stays outside; the rest of the piece is given up when it meets
         // such a face.
-        let mut outside = vec![false; inside.len()];
+        let mut outside = self.no_face();
         for f in self.faces() {
             let at_border = !seen[f.index()] && self.beside(f).any(|g| inside[g.index()]);
             if !at_border {
@@ -195,14 +198,14 @@ impl<'a> Growth<'a> {
     /// any.
     ///
     /// A fan with a face at the rim is kept before others, then the largest. Faces at the rim are never taken out.
-    fn trim_bow_ties(&self, inside: &mut [bool]) -> bool {
+    fn trim_bow_ties(&self, inside: &mut SparseValues<bool>) -> bool {
         let across = |h: HalfEdgeId| {
             let twin = self.whole.topology.twin(h);
             twin.filter(|t| inside[t.face().index()])
         };
         let on_border = |h: HalfEdgeId| inside[h.face().index()] && across(h).is_none();
         // Every open fan has one half-edge of the region's boundary that leaves its vertex.
-        let mut leaving = vec![0u8; self.whole.mesh.positions.len()];
+        let mut leaving = SparseValues::new(self.whole.mesh.positions.len(), 0u8);
         let mut ties = Vec::new();
         for h in self.faces().flat_map(FaceId::half_edges) {
             if on_border(h) {

@@ -5,7 +5,7 @@ use darn_budget::{Exhausted, Steps};
 
 use super::border::{FOLDED, PlacedFaces};
 use super::index::{FaceId, HalfEdgeId};
-use super::pairing::{Twins, edges_by_place};
+use super::pairing::{EdgesByPlace, Paired, Twins};
 use super::topology::face_components;
 
 /// Faces at one edge up to which pairs are chosen among them; where more meet, none is joined.
@@ -47,19 +47,12 @@ pub(super) fn joints(
 ) -> Result<Joints, Exhausted> {
     let origins = placed.faces.as_flattened();
     let place: Vec<u32> = (0..placed.positions.len() as u32).collect();
-    let (starts, edges) = edges_by_place(origins, &place);
     let mut twins = Twins::unpaired(origins.len());
     let mut doubtful: Vec<Vec<HalfEdgeId>> = Vec::new();
-    for s in starts.windows(2) {
-        let bucket = &edges[s[0] as usize..s[1] as usize];
-        for group in bucket.chunk_by(|x, y| x.0 == y.0) {
-            match *group {
-                [_] => {}
-                [(_, g), (_, h)] if placed.from(g) != placed.from(h) && is_exact(g, h) => {
-                    twins.join(g, h);
-                }
-                _ => doubtful.push(group.iter().map(|edge| edge.1).collect()),
-            }
+    for group in EdgesByPlace::new(origins, &place).groups() {
+        match *group {
+            [g, h] if placed.from(g) != placed.from(h) && is_exact(g, h) => twins.join(g, h),
+            _ => doubtful.push(group.to_vec()),
         }
     }
     let mut found = Joints {
@@ -70,7 +63,8 @@ pub(super) fn joints(
     shared.sort_unstable();
     for group in doubtful {
         steps.take(PAIR_WORK * (group.len() * group.len().min(MAX_FACES)) as u64)?;
-        let free = |h: HalfEdgeId| found.twins.of(h).is_none() && shared.binary_search(&h).is_err();
+        let free =
+            |h: HalfEdgeId| found.twins.twin(h).is_none() && shared.binary_search(&h).is_err();
         let hangs = |h: &HalfEdgeId| free(h.next()) && free(h.previous());
         let pairs = chosen(placed, &group, hangs, &is_exact);
         let is_crowded = group.len() > 2 || pairs.is_empty();

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use super::index::{HalfEdgeId, LoopId, VertexId};
 use super::openings::{Evidence, verdicts};
+use super::pairing::Paired;
 use super::topology::Topology;
 use super::turning::robust_turnings;
 use super::{TriMesh, Vec3, unit_for};
@@ -78,7 +79,7 @@ pub struct BoundaryLoop {
 /// Every loop is classified by itself. A component may have several outer boundaries or none (a strongly
 /// saddle-shaped or a closed surface); none of them is classified as a hole because another is missing.
 pub fn boundary_loops(mesh: &TriMesh, topology: &Topology) -> Vec<BoundaryLoop> {
-    let mut cycles = topology.twins().boundary_cycles(|h| topology.origin(h));
+    let mut cycles = topology.boundary_cycles(|h| topology.origin(h));
     cycles.sort_by_key(|c| c.first().map(|&h| (topology.origin(h), h)));
     let turnings = robust_turnings(mesh, topology, &cycles);
     let mut loops: Vec<BoundaryLoop> = (0u32..)
@@ -290,7 +291,7 @@ mod tests {
             let (_, topology, loops) = loops_of(&holed_sheet(n, hole));
             let mut found: Vec<HalfEdgeId> = loops.iter().flat_map(|l| l.half_edges.clone()).collect();
             found.sort_unstable();
-            let boundary: Vec<HalfEdgeId> = topology.twins().boundary().collect();
+            let boundary: Vec<HalfEdgeId> = topology.boundary().collect();
             prop_assert_eq!(found, boundary);
         }
     }

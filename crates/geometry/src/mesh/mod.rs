@@ -31,6 +31,7 @@ mod repair;
 pub mod shapes;
 pub mod skins;
 pub mod sound_hole;
+mod sparse;
 pub mod spikes;
 pub mod topology;
 mod tube_cut;

@@ -3,8 +3,9 @@
 use super::TriMesh;
 use super::growth::Growth;
 use super::index::{FaceId, HalfEdgeId, VertexId};
-use super::pairing::Twins;
+use super::pairing::{Paired, Twins};
 use super::region::{BoundedMesh, Region};
+use super::sparse::SparseValues;
 use super::tube_cut::CutEdges;
 
 /// A piece of the mesh, of any shape.
@@ -19,7 +20,7 @@ pub(super) struct Piece {
 
 impl Piece {
     /// The faces `inside` as a mesh of its own, cut along some edges.
-    pub fn new(growth: &Growth, inside: &[bool], cut: &CutEdges, reach: f64) -> Piece {
+    pub fn new(growth: &Growth, inside: &SparseValues<bool>, cut: &CutEdges, reach: f64) -> Piece {
         let BoundedMesh { mesh, topology, .. } = growth.whole;
         let faces: Vec<FaceId> = growth.faces().filter(|f| inside[f.index()]).collect();
         let to_local = |whole: HalfEdgeId| {
@@ -39,8 +40,8 @@ impl Piece {
                 twin.and_then(to_local)
             })
             .collect();
-        let (fan, count) = twins.corner_fans();
-        let origin = |local: HalfEdgeId| VertexId(fan[local.index()]);
+        let (fans, count) = twins.corner_fans();
+        let origin = |local: HalfEdgeId| VertexId(fans[local.face().index()][local.corner()]);
         let (mut rim, mut holes, mut rest) = (Vec::new(), Vec::new(), Vec::new());
         for cycle in twins.boundary_cycles(origin) {
             let loop_at = |&l: &HalfEdgeId| growth.loop_at(to_whole(l));
@@ -65,19 +66,18 @@ impl Piece {
         // χ = V − E + F = 2 − 2g − (loops); every edge has two half-edges or one and a boundary.
         let boundary = twins.boundary().count();
         let loop_count = holes.len() + rest.len() + usize::from(!rim.is_empty());
-        let euler = count as i64 - (twins.len() + boundary) as i64 / 2 + faces.len() as i64;
+        let euler = count as i64 - (twins.half_edges() + boundary) as i64 / 2 + faces.len() as i64;
         let handles = ((2 - loop_count as i64 - euler) / 2).max(0) as usize;
         let mut vertices = vec![VertexId(0); count];
-        for (l, &v) in (0u32..).map(HalfEdgeId).zip(&fan) {
+        for (l, &v) in (0u32..).map(HalfEdgeId).zip(fans.as_flattened()) {
             vertices[v as usize] = topology.origin(to_whole(l));
         }
         let positions = vertices.iter().map(|v| mesh.positions[v.index()]).collect();
-        let (triangles, _) = fan.as_chunks::<3>();
         Piece {
             region: Region {
                 mesh: TriMesh {
                     positions,
-                    faces: triangles.to_vec(),
+                    faces: fans,
                 },
                 vertices,
                 faces,

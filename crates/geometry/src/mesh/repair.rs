@@ -4,6 +4,7 @@
 //! split where vertices of others lie on them, the half-edges are paired ([`joints`](super::joints)), faces are turned
 //! so that neighbours face one way, and fins are left out.
 
+use std::borrow::Cow;
 use std::cmp::Reverse;
 
 use darn_budget::{Budget, Exhausted, Steps};
@@ -12,7 +13,7 @@ use super::TriMesh;
 use super::border::{Border, Junction, PlacedFaces, bounded};
 use super::index::{FaceId, HalfEdgeId};
 use super::joints::{Joints, joints, turned_half_edge, turning};
-use super::pairing::{Twins, pair_half_edges};
+use super::pairing::{Paired, Pairing, Twins, pair_half_edges};
 use super::topology::face_components;
 use super::weld::SetAside;
 
@@ -20,6 +21,10 @@ use super::weld::SetAside;
 const MAX_FIN: usize = 8;
 /// Nanoseconds of work a face in one pass over the mesh.
 const FACE_WORK: u64 = 150;
+
+/// Per face a vertex of the soup in the exact place of each corner; the soup's own faces where every vertex has a place of
+/// its own.
+type Places<'a> = Cow<'a, [[u32; 3]]>;
 
 /// Faces that lead back to those of a soup.
 #[derive(Debug, Clone, Default)]
@@ -39,11 +44,11 @@ struct Working {
 }
 
 /// The mesh of a soup before its vertices are numbered.
-pub(super) struct Repaired {
+pub(super) struct Repaired<'a> {
     /// The faces.
     pub sources: Sources,
     /// Per face a vertex of the soup in the exact place of each corner.
-    pub places: Vec<[u32; 3]>,
+    pub places: Places<'a>,
     /// The faces that were turned or split, ascending, with the soup's vertices at their corners.
     pub changed: Vec<(FaceId, [u32; 3])>,
     /// Their twins.
@@ -71,17 +76,24 @@ impl Repair<'_> {
     ///
     /// # Errors
     /// `Exhausted`.
-    pub fn joined(&self, mut sources: Sources) -> Result<Repaired, Exhausted> {
-        let mut set_aside = SetAside::default();
+    pub fn joined(&self) -> Result<Repaired<'_>, Exhausted> {
+        let mut sources = self.proper_faces();
+        let mut set_aside = SetAside {
+            degenerate_faces: self.soup.faces.len() - sources.soup_face.len(),
+            ..SetAside::default()
+        };
         let mut places = self.places_of(&sources);
         let mut pairing = pair_half_edges(&places, self.exact);
+        let duplicates = duplicates(&places, &pairing, &mut sources.two_sided);
+        if !duplicates.is_empty() {
+            set_aside.duplicate_faces = duplicates.len();
+            (sources, places) = self.apart_from(&duplicates, sources)?;
+            pairing = pair_half_edges(&places, self.exact);
+        }
         let slivers = self.border_slivers(&places, &pairing.twins);
         if !slivers.is_empty() {
-            self.budget.spend_at_once(FACE_WORK * places.len() as u64)?;
-            set_aside.degenerate_faces = slivers.len();
-            let is_sliver = |f: usize| slivers.binary_search(&FaceId(f as u32)).is_ok();
-            sources = sources.only(|f| !is_sliver(f));
-            places = self.places_of(&sources);
+            set_aside.degenerate_faces += slivers.len();
+            (sources, places) = self.apart_from(&slivers, sources)?;
             pairing = pair_half_edges(&places, self.exact);
         }
         let border = self.border(&places, &pairing.twins)?;
@@ -115,25 +127,60 @@ impl Repair<'_> {
             near.iter()
                 .for_each(|(from, to)| lowest[*from as usize] = *to);
             place.iter_mut().for_each(|p| *p = lowest[*p as usize]);
-            places = placed(&faces.corners, &place);
+            places = placed(&faces.corners, &place).into();
             let twins = pair_half_edges(&places, &place).twins;
             junctions = self.border(&places, &twins)?.junctions()?;
         }
         if !junctions.is_empty() {
             set_aside.t_junctions = junctions.len();
             faces = faces.split(&junctions);
-            places = placed(&faces.corners, &place);
+            places = placed(&faces.corners, &place).into();
         }
         self.chosen(faces, &places, set_aside)
     }
 
+    /// The faces with three different places.
+    fn proper_faces(&self) -> Sources {
+        let is_proper = |face: &[u32; 3]| match face.map(|v| self.exact.get(v as usize)) {
+            [Some(a), Some(b), Some(c)] => a != b && b != c && c != a,
+            _ => false,
+        };
+        let faces = (0u32..).zip(&self.soup.faces);
+        let soup_face: Vec<u32> = faces
+            .filter(|(_, face)| is_proper(face))
+            .map(|(f, _)| f)
+            .collect();
+        Sources {
+            two_sided: vec![false; soup_face.len()],
+            soup_face,
+        }
+    }
+
     /// The soup's faces by exact places.
-    fn places_of(&self, sources: &Sources) -> Vec<[u32; 3]> {
+    fn places_of(&self, sources: &Sources) -> Places<'_> {
+        let is_own_place = |(v, place): (u32, &u32)| v == *place;
+        let all = sources.soup_face.len() == self.soup.faces.len();
+        if all && (0u32..).zip(self.exact).all(is_own_place) {
+            return Cow::Borrowed(&self.soup.faces);
+        }
         let soup_faces = sources.soup_face.iter();
         let place = |v: u32| self.exact[v as usize];
         soup_faces
             .map(|&f| self.soup.faces[f as usize].map(place))
             .collect()
+    }
+
+    /// The faces but for some, which are ascending, and their places.
+    fn apart_from(
+        &self,
+        left_out: &[FaceId],
+        sources: Sources,
+    ) -> Result<(Sources, Places<'_>), Exhausted> {
+        let faces = sources.soup_face.len();
+        self.budget.spend_at_once(FACE_WORK * faces as u64)?;
+        let sources = sources.only(|f| left_out.binary_search(&FaceId(f as u32)).is_err());
+        let places = self.places_of(&sources);
+        Ok((sources, places))
     }
 
     /// The faces at the border that are no higher than the tolerance, ascending: they keep borders apart that meet.
@@ -176,7 +223,7 @@ impl Repair<'_> {
         mut faces: Working,
         places: &[[u32; 3]],
         mut set_aside: SetAside,
-    ) -> Result<Repaired, Exhausted> {
+    ) -> Result<Repaired<'_>, Exhausted> {
         self.budget.spend_at_once(FACE_WORK * places.len() as u64)?;
         let mut steps = Steps::of(self.budget);
         let exact = placed(&faces.corners, self.exact);
@@ -195,9 +242,9 @@ impl Repair<'_> {
             ..
         } = joints;
         crowded.extend(turning.apart.iter().map(|pair| pair.to_vec()));
-        let mut twins = Twins::unpaired(before.len());
-        for h in (0..before.len() as u32).map(HalfEdgeId) {
-            if let Some(g) = before.of(h).filter(|g| *g > h) {
+        let mut twins = Twins::unpaired(before.half_edges());
+        for h in (0..before.half_edges() as u32).map(HalfEdgeId) {
+            if let Some(g) = before.twin(h).filter(|g| *g > h) {
                 twins.join(turned(g), turned(h));
             }
         }
@@ -221,7 +268,7 @@ impl Repair<'_> {
             (own != *corners).then_some((FaceId(f), *corners))
         };
         Ok(Repaired {
-            places: placed(&faces.corners, self.exact),
+            places: placed(&faces.corners, self.exact).into(),
             changed: (0u32..).zip(&faces.corners).filter_map(unlike).collect(),
             sources: faces.sources,
             twins,
@@ -229,6 +276,46 @@ impl Repair<'_> {
             set_aside,
         })
     }
+}
+
+/// The faces that have the three places of an earlier one, ascending; marks those that are kept and have a copy which
+/// shows the other side.
+fn duplicates(places: &[[u32; 3]], pairing: &Pairing, two_sided: &mut [bool]) -> Vec<FaceId> {
+    // Two faces with the same places share three edges: each of these has no pair, or is a pair of the two.
+    let may_be = |f: FaceId| {
+        let [g, h, _] = f
+            .half_edges()
+            .map(|h| pairing.twins.twin(h).map(HalfEdgeId::face));
+        let unpaired = |h: HalfEdgeId| pairing.non_manifold.binary_search(&h).is_ok();
+        match (g, h) {
+            (Some(g), Some(h)) => g == h,
+            _ => f.half_edges().into_iter().any(unpaired),
+        }
+    };
+    let sorted = |f: FaceId| {
+        let mut key = places[f.index()];
+        key.sort_unstable();
+        (key, f)
+    };
+    let faces = (0..places.len() as u32).map(FaceId);
+    let mut candidates: Vec<([u32; 3], FaceId)> =
+        faces.filter(|f| may_be(*f)).map(sorted).collect();
+    candidates.sort_unstable();
+    // Around a face of three different places, two of the three steps ascend in one orientation and one in the other.
+    let ascends_twice = |f: FaceId| {
+        let [a, b, c] = places[f.index()];
+        let steps = [(a, b), (b, c), (c, a)];
+        steps.iter().filter(|(from, to)| from < to).count() == 2
+    };
+    let mut found = Vec::new();
+    for group in candidates.chunk_by(|x, y| x.0 == y.0) {
+        let (kept, copies) = (group[0].1, &group[1..]);
+        two_sided[kept.index()] =
+            (copies.iter()).any(|c| ascends_twice(c.1) != ascends_twice(kept));
+        found.extend(copies.iter().map(|copy| copy.1));
+    }
+    found.sort_unstable();
+    found
 }
 
 /// The faces by places.
@@ -269,12 +356,14 @@ fn without(
     let is_kept = |h: &HalfEdgeId| !is_fin[h.face().index()];
     let is_shared = |group: &&Vec<HalfEdgeId>| group.iter().filter(|h| is_kept(h)).count() > 1;
     let shared = crowded.iter().filter(is_shared).flatten();
-    let unjoined = shared.filter(|h| is_kept(h) && twins.of(**h).is_none());
+    let unjoined = shared.filter(|h| is_kept(h) && twins.twin(**h).is_none());
     let mut non_manifold: Vec<HalfEdgeId> = unjoined.map(|&h| renumbered(h)).collect();
     non_manifold.sort_unstable();
     non_manifold.dedup();
-    let half_edges = (0..twins.len() as u32).map(HalfEdgeId).filter(is_kept);
-    let twins = half_edges.map(|h| twins.of(h).map(renumbered)).collect();
+    let half_edges = (0..twins.half_edges() as u32)
+        .map(HalfEdgeId)
+        .filter(is_kept);
+    let twins = half_edges.map(|h| twins.twin(h).map(renumbered)).collect();
     (twins, non_manifold)
 }
 

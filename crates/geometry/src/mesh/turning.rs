@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use super::curvature::angle_defect;
 use super::index::{HalfEdgeId, LoopId, VertexId};
+use super::pairing::Paired;
 use super::topology::Topology;
 use super::{TriMesh, Vec3};
 
@@ -51,7 +52,7 @@ pub(super) fn vertex_turnings(
     half_edges: &[HalfEdgeId],
 ) -> impl Iterator<Item = f64> {
     half_edges.iter().map(|&h| {
-        let fan = topology.twins().fan_after(h);
+        let fan = topology.fan_after(h);
         let angles: f64 = fan
             .map(|e| mesh.corner_angle(e.face().index(), e.corner()))
             .sum();

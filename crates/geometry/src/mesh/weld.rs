@@ -1,11 +1,13 @@
 //! Welding: a triangle soup made into surfaces, forgiving what files have that cloth has not.
 
+use std::sync::Arc;
+
 use darn_budget::{Budget, Exhausted};
 
 use super::TriMesh;
 use super::index::{FaceId, HalfEdgeId};
-use super::pairing::{Twins, bucket_starts, places};
-use super::repair::{Repair, Repaired, Sources};
+use super::pairing::{Paired, Twins, places};
+use super::repair::{Repair, Repaired};
 use super::topology::Topology;
 
 /// A triangle soup made into surfaces, and how its faces lead back to the soup's.
@@ -21,7 +23,7 @@ pub struct WeldedMesh {
     /// Per welded face whether one of the faces left out shows its other side.
     pub two_sided: Vec<bool>,
     /// The twins of the welded mesh's half-edges.
-    twins: Twins,
+    twins: Arc<Twins>,
     /// What [`Topology::non_manifold`] lists.
     non_manifold: Vec<HalfEdgeId>,
     /// The faces that were turned or split, ascending, with the soup's vertices at their corners.
@@ -96,17 +98,12 @@ pub fn weld_within(
     budget: &Budget,
 ) -> Result<WeldedMesh, Exhausted> {
     let exact = places(soup);
-    let distinct = distinct_faces(&soup.faces, &exact);
     let repair = Repair {
         soup,
         exact: &exact,
         precision,
         budget,
     };
-    let repaired = repair.joined(Sources {
-        soup_face: distinct.faces,
-        two_sided: distinct.two_sided,
-    })?;
     let Repaired {
         sources,
         places,
@@ -114,100 +111,23 @@ pub fn weld_within(
         twins,
         non_manifold,
         set_aside,
-    } = repaired;
-    let (fan, fans) = twins.corner_fans();
-    let mut positions = Vec::with_capacity(fans);
-    for (corner, &place) in places.as_flattened().iter().enumerate() {
-        if fan[corner] as usize == positions.len() {
+    } = repair.joined()?;
+    let (faces, vertices) = twins.corner_fans();
+    let mut positions = Vec::with_capacity(vertices);
+    for (&vertex, &place) in faces.as_flattened().iter().zip(places.as_flattened()) {
+        if vertex as usize == positions.len() {
             positions.push(soup.positions[place as usize]);
         }
     }
-    let (numbered, _) = fan.as_chunks::<3>();
     Ok(WeldedMesh {
-        mesh: TriMesh {
-            positions,
-            faces: numbered.to_vec(),
-        },
+        mesh: TriMesh { positions, faces },
         changed,
         soup_face: sources.soup_face,
-        set_aside: SetAside {
-            degenerate_faces: distinct.set_aside.degenerate_faces + set_aside.degenerate_faces,
-            duplicate_faces: distinct.set_aside.duplicate_faces,
-            ..set_aside
-        },
+        set_aside,
         two_sided: sources.two_sided,
-        twins,
+        twins: twins.into(),
         non_manifold,
     })
-}
-
-/// The faces that [`distinct_faces`] keeps.
-struct DistinctFaces {
-    /// Their indices, ascending.
-    faces: Vec<u32>,
-    /// Per kept face whether a later face has the same places in the opposite order.
-    two_sided: Vec<bool>,
-    /// The others.
-    set_aside: SetAside,
-}
-
-/// The faces with three different places that no earlier face has.
-fn distinct_faces(faces: &[[u32; 3]], place: &[u32]) -> DistinctFaces {
-    let places = |face: &[u32; 3]| match face.map(|v| place.get(v as usize)) {
-        [Some(&a), Some(&b), Some(&c)] if a != b && b != c && c != a => {
-            let mut key = [a, b, c];
-            key.sort_unstable();
-            Some(key)
-        }
-        _ => None,
-    };
-    // In buckets by lowest place, each sorted: near linear, and no input makes it quadratic.
-    let valid = || {
-        (0u32..)
-            .zip(faces)
-            .filter_map(|(f, face)| Some((places(face)?, f)))
-    };
-    let starts = bucket_starts(valid().map(|(key, _)| key[0]), place.len());
-    let mut fill = starts.clone();
-    let mut sorted = vec![(0, 0, 0); starts.last().map_or(0, |&end| end as usize)];
-    for ([low, middle, high], f) in valid() {
-        sorted[fill[low as usize] as usize] = (middle, high, f);
-        fill[low as usize] += 1;
-    }
-    // Around a face of three different places, two of the three steps ascend in one orientation and one in the other.
-    let ascends_twice = |f: u32| {
-        let [a, b, c] = faces[f as usize].map(|v| place[v as usize]);
-        [(a, b), (b, c), (c, a)]
-            .iter()
-            .filter(|(from, to)| from < to)
-            .count()
-            == 2
-    };
-    let mut first = vec![false; faces.len()];
-    let mut two_sided = vec![false; faces.len()];
-    for s in starts.windows(2) {
-        let bucket = &mut sorted[s[0] as usize..s[1] as usize];
-        bucket.sort_unstable();
-        for group in bucket.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
-            let (kept, rest) = (group[0].2, &group[1..]);
-            first[kept as usize] = true;
-            two_sided[kept as usize] =
-                (rest.iter()).any(|other| ascends_twice(other.2) != ascends_twice(kept));
-        }
-    }
-    let (kept, two_sided): (Vec<u32>, Vec<bool>) = (0..faces.len() as u32)
-        .filter(|&f| first[f as usize])
-        .map(|f| (f, two_sided[f as usize]))
-        .unzip();
-    DistinctFaces {
-        set_aside: SetAside {
-            degenerate_faces: faces.len() - sorted.len(),
-            duplicate_faces: sorted.len() - kept.len(),
-            ..SetAside::default()
-        },
-        faces: kept,
-        two_sided,
-    }
 }
 
 #[cfg(test)]
@@ -279,7 +199,7 @@ mod tests {
             vertices.sort_unstable();
             vertices.dedup();
             prop_assert_eq!(vertices.len(), count);
-            prop_assert_eq!(count, topology.twins().boundary().count());
+            prop_assert_eq!(count, topology.boundary().count());
         }
     }
 

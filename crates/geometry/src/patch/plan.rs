@@ -23,6 +23,8 @@ use super::triangulate::Triangulation;
 use super::{Patch, PatchError, PatchWork};
 use crate::flatten::Chart;
 use crate::grid;
+use crate::mesh::blocks::FaceBlocks;
+use crate::mesh::bounds::Bounds;
 use crate::mesh::layers::Layers;
 use crate::mesh::region::Region;
 use crate::mesh::{TriMesh, Vec2, Vec3};
@@ -63,18 +65,20 @@ pub fn plan<'a>(
 ) -> Result<PatchPlan, PatchError> {
     let work = work.into();
     let rim = reversed_rim(region);
-    let rim_points = RimPoints::new(&positions_of(&rim, &region.mesh), &region.mesh);
+    let (mesh, faces) = (&region.mesh, 0..region.mesh.faces.len());
+    let rim_points = RimPoints::new(&positions_of(&rim, mesh), mesh, faces);
     PatchMesh::new(rim, rim_points, region, chart, work)?.plan(region, chart, None, work)
 }
 
 impl PatchMesh {
     /// The triangles in a region's hole, in the whole scan. The region's positions may differ from the scan's (when it was denoised), and parts of
-    /// the scan beyond the region may touch the rim.
+    /// the scan beyond the region may touch the rim: `blocks` are the scan's.
     ///
     /// # Errors
     /// `RimCrosses` when the rim overlaps itself in the plane, `Singular` when triangles are degenerate; `Exhausted`.
     pub fn in_scan<'a>(
         scan: &TriMesh,
+        blocks: &FaceBlocks,
         region: &Region,
         chart: &Chart,
         work: impl Into<PatchWork<'a>>,
@@ -83,8 +87,13 @@ impl PatchMesh {
         let scanned: Vec<u32> = (rim.iter())
             .map(|v| region.vertices[*v as usize].0)
             .collect();
-        let rim_points = RimPoints::new(&positions_of(&scanned, scan), scan);
-        PatchMesh::new(rim, rim_points, region, chart, work.into())
+        let work = work.into();
+        work.budget.spend(blocks.search_work())?;
+        let points = positions_of(&scanned, scan);
+        let bounds = Bounds::of(&points);
+        let near = bounds.iter().flat_map(|bounds| blocks.near(bounds));
+        let rim_points = RimPoints::new(&points, scan, near);
+        PatchMesh::new(rim, rim_points, region, chart, work)
     }
 
     fn new(

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::flatten::{FlattenLimits, UvSquare, flatten};
+use crate::mesh::blocks::FaceBlocks;
 use crate::mesh::intersect::intersections_with;
 use crate::mesh::layers::Layers;
 use crate::mesh::loops::boundary_loops;
@@ -228,7 +229,8 @@ fn a_rim_that_touches_itself_is_closed_on_the_scan() {
     apart.for_each(|(v, p)| p.z += 1e-3 * (v as f64).sin());
     let chart = flatten(&seen, &FlattenLimits::default(), Budget::unlimited()).unwrap();
     let options = PatchOptions::default();
-    let mesh = PatchMesh::in_scan(&scan, &seen, &chart, &options).unwrap();
+    let blocks = FaceBlocks::new(&scan);
+    let mesh = PatchMesh::in_scan(&scan, &blocks, &seen, &chart, &options).unwrap();
     let plan = mesh.plan(&seen, &chart, None, &options).unwrap();
     let plan = plan.with_region_at(&region.mesh.positions).unwrap();
     let filled = vec![Vec3::zeros(); crate::grid::CELLS];

@@ -10,6 +10,7 @@ use std::ops::Range;
 
 use darn_budget::{Budget, Exhausted};
 
+use crate::mesh::bounds::Bounds;
 use crate::mesh::{TriMesh, Vec2, Vec3};
 use crate::patch::triangulate::{self, Outline, Triangulation};
 use crate::patch::{PatchError, untangle};
@@ -27,18 +28,21 @@ pub(super) struct RimPoints {
 }
 
 impl RimPoints {
-    /// The points of a rim whose vertices lie at `rim` on the scan.
-    pub fn new(rim: &[Vec3], scan: &TriMesh) -> RimPoints {
+    /// The points of a rim whose vertices lie at `rim` on the scan; `near` holds all faces of the scan that meet their
+    /// box, and perhaps others.
+    pub fn new(rim: &[Vec3], scan: &TriMesh, near: impl Iterator<Item = usize>) -> RimPoints {
         let (line, first) = points_of(rim);
-        let low = rim.iter().fold(Vec3::repeat(f64::MAX), |m, p| m.inf(p));
-        let high = rim.iter().fold(Vec3::repeat(f64::MIN), |m, p| m.sup(p));
-        // The box test spares a look-up for most of the scan.
-        let beside = |p: &Vec3| (0..3).any(|k| p[k] < low[k] || p[k] > high[k]);
-        let point = |p: &Vec3| (!beside(p)).then(|| first.get(&bits(p)).copied()).flatten();
-        let of: Vec<Option<u32>> = scan.positions.iter().map(point).collect();
-        let joined = (scan.faces.iter())
-            .flat_map(sides)
-            .filter_map(|(a, b)| Some(edge(of[a as usize]?, of[b as usize]?)))
+        let bounds = Bounds::of(rim);
+        let point = |v: u32| {
+            let p = &scan.positions[v as usize];
+            // Spares a look-up for most of the scan.
+            let inside = bounds.is_some_and(|bounds| bounds.contains(p));
+            inside.then(|| first.get(&bits(p)).copied()).flatten()
+        };
+        let joined = near
+            .map(|face| scan.faces[face].map(point))
+            .flat_map(|[a, b, c]| [(a, b), (b, c), (c, a)])
+            .filter_map(|(a, b)| Some(edge(a?, b?)))
             .collect();
         RimPoints { line, joined }
     }
