@@ -34,11 +34,11 @@ pub struct ServeCommand {
 #[derive(Debug, Clone, Args)]
 pub struct SizeArgs {
     /// Most triangles a scan may have
-    #[arg(long, env = "DARN_MAX_FACES", value_name = "N", default_value = "4000000", value_parser = count)]
+    #[arg(long, env = "DARN_MAX_FACES", value_name = "N", default_value = "10000000", value_parser = count)]
     pub max_faces: usize,
 
     /// Most vertices a scan may have, as its files count them: one that a texture seam splits counts twice
-    #[arg(long, env = "DARN_MAX_VERTICES", value_name = "N", default_value = "2000000", value_parser = count)]
+    #[arg(long, env = "DARN_MAX_VERTICES", value_name = "N", default_value = "6000000", value_parser = count)]
     pub max_vertices: usize,
 }
 

@@ -30,11 +30,11 @@ pub struct ScanLimits {
 impl Default for ScanLimits {
     fn default() -> Self {
         Self {
-            max_vertices: 2_000_000,
-            max_faces: 4_000_000,
+            max_vertices: 6_000_000,
+            max_faces: 10_000_000,
             max_nodes: 100_000,
             max_primitives: 10_000,
-            max_attribute_values: 32_000_000,
+            max_attribute_values: 64_000_000,
             max_attribute_sets: 16,
             max_morph_targets: 1024,
             max_decoded_bytes: 1 << 29,

@@ -81,7 +81,7 @@ pub struct ServeArgs {
     pub memory: Option<usize>,
 
     /// Largest request body, such as 64MiB
-    #[arg(long, env = "DARN_BODY_LIMIT", value_name = "SIZE", default_value = "128MiB", value_parser = size)]
+    #[arg(long, env = "DARN_BODY_LIMIT", value_name = "SIZE", default_value = "512MiB", value_parser = size)]
     pub body_limit: usize,
 
     /// Longest pause between two pieces of a request or of an answer that is taken; a whole body or answer may take eight times as long.
@@ -338,7 +338,7 @@ mod tests {
     #[test]
     fn defaults_parse_and_bad_values_are_named() {
         let settings = Command::try_parse_from(["darn"]).unwrap().serve;
-        assert_eq!(settings.body_limit, 128 << 20);
+        assert_eq!(settings.body_limit, 512 << 20);
         assert!(settings.workers() >= 1);
         assert!((1..=1024).contains(&settings.connections()));
         assert_eq!(settings.body_rate, 512);
