@@ -3,6 +3,7 @@
 
 use gltf::json::accessor::{BYTE, FLOAT, SHORT, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT};
 use gltf::json::accessor::{ComponentType, Type};
+use rayon::prelude::*;
 
 use super::buffers::{BufferView, Document};
 use super::compressed::draco::DracoAttribute;
@@ -137,19 +138,30 @@ impl<'d> Accessor<'d> {
         })
     }
 
-    fn collect<T: Copy>(&self, zero: T, read: impl Fn(&[u8]) -> T) -> Result<Vec<T>, ScanError> {
+    fn collect<T: Copy + Send>(
+        &self,
+        zero: T,
+        read: impl Fn(&[u8]) -> T + Sync,
+    ) -> Result<Vec<T>, ScanError> {
         let mut out = vec![zero; self.count];
         self.read_into(&mut out, read)?;
         Ok(out)
     }
 
     /// Reads the elements that there are; the others stay.
-    fn read_into<T>(&self, out: &mut [T], read: impl Fn(&[u8]) -> T) -> Result<(), ScanError> {
+    fn read_into<T: Send>(
+        &self,
+        out: &mut [T],
+        read: impl Fn(&[u8]) -> T + Sync,
+    ) -> Result<(), ScanError> {
         match &self.base {
             ElementSource::View(base) => {
-                for (slot, bytes) in out.iter_mut().zip(base.iter()) {
-                    *slot = read(bytes);
-                }
+                let parts = out.par_chunks_mut(PART).zip(base.parts());
+                parts.for_each(|(out, part)| {
+                    for (slot, bytes) in out.iter_mut().zip(part.iter()) {
+                        *slot = read(bytes);
+                    }
+                });
             }
             ElementSource::Draco(attribute) => self.read_draco(attribute, out, &read)?,
             ElementSource::Zero => {}
@@ -194,7 +206,21 @@ impl<'d> Accessor<'d> {
     }
 }
 
+/// Elements that one thread reads at once.
+const PART: usize = 1 << 14;
+
 impl<'d> Elements<'d> {
+    /// The elements in parts of [`PART`].
+    fn parts(&self) -> impl IndexedParallelIterator<Item = Elements<'d>> {
+        let &Elements { stride, size, .. } = self;
+        let part = move |bytes| Elements {
+            bytes,
+            stride,
+            size,
+        };
+        self.bytes.par_chunks(stride * PART).map(part)
+    }
+
     /// The elements in order; their extent was checked on opening.
     fn iter(&self) -> impl Iterator<Item = &'d [u8]> {
         let size = self.size;
