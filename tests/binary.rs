@@ -305,3 +305,106 @@ fn commands_have_the_limits_of_the_service() {
         assert!(said.contains(words), "{limit:?}: {said}");
     }
 }
+
+/// A square of two triangles as OBJ: no holes.
+const WHOLE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+
+/// Runs a batch over a folder: its exit code, and its lines by the name of their scans.
+fn batch(
+    scans: &std::path::Path,
+    out: &std::path::Path,
+    more: &[&str],
+) -> (Option<i32>, Vec<serde_json::Value>) {
+    let mut command = darn();
+    command
+        .arg("inpaint")
+        .arg("--batch")
+        .arg(scans)
+        .arg("-o")
+        .arg(out)
+        .args(more);
+    let ran = command.output().expect("darn runs");
+    let text = String::from_utf8(ran.stdout).expect("text");
+    let lines = text
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("a line of JSON"));
+    (ran.status.code(), lines.collect())
+}
+
+#[test]
+fn a_batch_tells_of_each_scan_goes_on_after_failures_and_is_resumed() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (scans, out) = (folder.path().join("scans"), folder.path().join("out"));
+    std::fs::create_dir_all(scans.join("below")).expect("folders");
+    std::fs::write(scans.join("a.glb"), EXAMPLE).expect("written");
+    std::fs::write(scans.join("b.ply"), b"ply\nformat ascii 1.0\nend_header\n").expect("written");
+    std::fs::write(scans.join("below/c.obj"), WHOLE).expect("written");
+    let (code, lines) = batch(&scans, &out, &[]);
+    assert_eq!(code, Some(1));
+    let told =
+        |key: &str| -> Vec<&serde_json::Value> { lines.iter().map(|line| &line[key]).collect() };
+    assert_eq!(told("status"), ["mended", "failed", "failed"]);
+    assert_eq!(lines[0]["filled"], 1);
+    assert_eq!(
+        lines[0]["report"]["holes"].as_array().map(Vec::len),
+        Some(1)
+    );
+    assert_eq!(told("code")[1..], ["invalid_mesh_file", "no_holes"]);
+    // The bytes are those of a mend by itself.
+    let alone = folder.path().join("alone.glb");
+    let status = darn()
+        .arg("inpaint")
+        .arg(scans.join("a.glb"))
+        .arg("-o")
+        .arg(&alone)
+        .status();
+    assert!(status.expect("darn runs").success());
+    let read = |path: std::path::PathBuf| std::fs::read(path).expect("a file");
+    assert!(read(out.join("a.glb")) == read(alone));
+    let report: serde_json::Value =
+        serde_json::from_slice(&read(out.join("a.glb.report.json"))).expect("JSON");
+    assert_eq!(report, lines[0]["report"]);
+    // Again: what is there is done, and a scan without holes is copied if that is asked for.
+    std::fs::remove_file(scans.join("b.ply")).expect("removed");
+    let (code, lines) = batch(&scans, &out, &["--if-no-holes", "copy"]);
+    assert_eq!(code, Some(0));
+    let statuses: Vec<&serde_json::Value> = lines.iter().map(|line| &line["status"]).collect();
+    assert_eq!(statuses, ["done_before", "copied"]);
+    assert_eq!(read(out.join("below/c.obj")), WHOLE.as_bytes());
+}
+
+#[test]
+fn lines_of_json_tell_stages_and_the_outcome() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (scan, out) = (folder.path().join("a.obj"), folder.path().join("b.obj"));
+    std::fs::write(&scan, WHOLE).expect("written");
+    let run = |more: &[&str]| {
+        let mut command = darn();
+        command
+            .arg("inpaint")
+            .arg(&scan)
+            .arg("-o")
+            .arg(&out)
+            .arg("--json-lines")
+            .args(more);
+        let ran = command.output().expect("darn runs");
+        let text = String::from_utf8(ran.stdout).expect("text");
+        let lines: Vec<serde_json::Value> = (text.lines())
+            .map(|line| serde_json::from_str(line).expect("a line of JSON"))
+            .collect();
+        (ran.status.code(), lines)
+    };
+    let (code, lines) = run(&[]);
+    assert_eq!(code, Some(1));
+    let (last, stages) = lines.split_last().expect("lines");
+    assert!(stages.iter().all(|line| line["type"] == "stage"));
+    assert_eq!(
+        (&last["type"], &last["status"], &last["code"]),
+        (&"report".into(), &"failed".into(), &"no_holes".into())
+    );
+    let (code, lines) = run(&["--if-no-holes", "copy"]);
+    assert_eq!(
+        (code, lines.last().map(|line| line["status"] == "copied")),
+        (Some(0), Some(true))
+    );
+}

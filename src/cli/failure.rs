@@ -1,6 +1,8 @@
 //! How a command fails: one line of text and an exit code.
 
-use darn_contract::error_chain;
+use darn_contract::{Code, error_chain};
+use darn_gltf_scan::ScanError;
+use darn_mend::MendError;
 use std::error::Error;
 
 /// Why a command failed.
@@ -26,6 +28,16 @@ impl Failure {
             Self::Usage(_) => super::USAGE,
             Self::Failed { .. } => 1,
         }
+    }
+
+    /// The code of an error of mending, or of reading a scan.
+    pub fn mend_code(&self) -> Option<Code> {
+        let Self::Failed { cause, .. } = self else {
+            return None;
+        };
+        let mending = cause.downcast_ref::<MendError>().map(MendError::code);
+        let reading = cause.downcast_ref::<ScanError>();
+        mending.or_else(|| reading.map(darn_mend::reading_code))
     }
 }
 

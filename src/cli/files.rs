@@ -3,7 +3,6 @@
 use super::failure::{Failure, OrFail};
 use crate::settings::SizeArgs;
 use darn_budget::Budget;
-use darn_contract::v1::FileDigests;
 use darn_gltf_scan::{Container, Scan, Siblings, sibling_paths};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -45,19 +44,28 @@ fn siblings(gltf: &Path, paths: Vec<String>) -> Result<Siblings, Failure> {
     Ok(Siblings(files))
 }
 
-/// Writes a mended scan: as a GLB with all its files if the output's name ends so, else in the container it was read from.
-///
-/// A glTF written into another folder takes its files there; a file that is there already stays. Returns the digests of a GLB
-/// that was packed here.
-pub fn write_scan(path: &Path, scan: &Scan, mended: &[u8]) -> Result<Option<FileDigests>, Failure> {
-    let writing = || format!("write {}", path.display());
+/// A mended scan as a GLB with all its files, if that is what the output's name asks for and the scan is not one already.
+pub fn packed_scan(path: &Path, scan: &Scan, mended: &[u8]) -> Result<Option<Vec<u8>>, Failure> {
     let extension = path.extension().unwrap_or_default();
-    if extension.eq_ignore_ascii_case("glb") && scan.container() != Container::Glb {
-        let packed = scan.packed(mended).or_fail(writing())?;
-        write(path, &packed)?;
-        return Ok(Some(darn_mend::file_digests(&packed)));
+    if let Some(own) = own_extension(scan.container())
+        && !extension.eq_ignore_ascii_case(own)
+    {
+        let name = path.display();
+        return Err(Failure::Usage(format!(
+            "{name}: the mended scan has the format of the scan; let the output's name end in .{own}"
+        )));
     }
-    write(path, mended)?;
+    if extension.eq_ignore_ascii_case("glb") && scan.container() != Container::Glb {
+        let packed = scan
+            .packed(mended)
+            .or_fail(format!("write {}", path.display()));
+        return packed.map(Some);
+    }
+    Ok(None)
+}
+
+/// Writes a mended scan in the container it was read from. A glTF written into another folder takes its files there; a file that is there already stays.
+pub fn write_scan(path: &Path, scan: &Scan, mended: &[u8]) -> Result<(), Failure> {
     let folder = path.parent().unwrap_or(Path::new(""));
     for (name, bytes) in scan.siblings() {
         let place = folder.join(name);
@@ -67,7 +75,16 @@ pub fn write_scan(path: &Path, scan: &Scan, mended: &[u8]) -> Result<Option<File
             write(&place, bytes)?;
         }
     }
-    Ok(None)
+    write(path, mended)
+}
+
+/// What the name of a mesh file ends in; a glTF may have any name.
+fn own_extension(container: Container) -> Option<&'static str> {
+    match container {
+        Container::Obj => Some("obj"),
+        Container::Ply => Some("ply"),
+        Container::Glb | Container::Gltf | Container::Zip => None,
+    }
 }
 
 /// A message as the text of a JSON file; `doing` says what fails when it cannot be written.

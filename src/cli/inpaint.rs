@@ -8,18 +8,30 @@ use super::progress::WorkProgress;
 use super::provenance;
 use crate::settings::{DeadlineArgs, NetworkArgs, SizeArgs, TextureArgs};
 use darn_contract::v1::{HoleReport, Report};
-use darn_contract::{Constraints, FieldError};
-use darn_mend::Call;
+use darn_contract::{Constraints, FieldError, Outcome};
+use darn_mend::{Call, MendError, NetworkMender};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 #[derive(Debug, clap::Args)]
 pub struct InpaintArgs {
-    /// The scan: GLB; glTF, with its files beside it; or a zip of those
-    scan: PathBuf,
-    /// Where the mended scan goes, in the container the scan came in; a name that ends in .glb makes one file of a glTF and its files
+    /// The scan: GLB; glTF, with its files beside it; a zip of those; OBJ; or PLY
+    #[arg(required_unless_present = "batch", conflicts_with = "batch")]
+    scan: Option<PathBuf>,
+    /// Where the mended scan goes, in the format the scan came in; a name that ends in .glb makes one file of a glTF and its files. With --batch the
+    /// folder where all mended scans go, each with its report
     #[arg(short, long)]
-    output: PathBuf,
+    pub output: PathBuf,
+    /// Mend all scans in a folder and below it, or (-) those that standard input names, one on a line; those whose output is there already are done.
+    /// Prints a line of JSON for each
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["report", "provenance"])]
+    batch: Option<PathBuf>,
+    /// What becomes of a scan without holes
+    #[arg(long, value_name = "WHAT", default_value = "fail")]
+    if_no_holes: IfNoHoles,
+    /// Print lines of JSON: one when a stage begins, and one with the outcome and the report
+    #[arg(long)]
+    json_lines: bool,
     /// What the new cloth is to keep to, as JSON
     #[arg(short, long)]
     constraints: Option<PathBuf>,
@@ -42,43 +54,202 @@ pub struct InpaintArgs {
     network: NetworkArgs,
 }
 
+/// What becomes of a scan without holes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum IfNoHoles {
+    /// The command fails.
+    Fail,
+    /// The output is a copy of the scan.
+    Copy,
+}
+
 /// Runs `darn inpaint`.
 pub fn run(args: &InpaintArgs) -> Result<(), Failure> {
-    let name = args.scan.display();
-    let progress = WorkProgress::staged("darn");
-    progress.stage("reading");
-    let constraints = match &args.constraints {
-        Some(path) => constraints(path)?,
-        None => Constraints::default(),
-    };
-    let budget = args.deadline.budget();
+    if let Some(source) = &args.batch {
+        return super::batch::run(args, source);
+    }
+    let scan = args.scan.as_deref().unwrap_or(Path::new(""));
     let started = Instant::now();
-    let scan = files::read_scan(&args.scan, &args.size, &budget)?;
-    let read = started.elapsed();
-    progress.stage("loading weights");
-    let mut mender = mender(&args.network)?;
-    args.texture.apply(&mut mender);
-    progress.stage("mending");
-    let call = Call {
-        mender: &mender,
-        budget: &budget,
+    let progress = (!args.json_lines).then(|| WorkProgress::staged("darn"));
+    let stage = |what: &str| match &progress {
+        Some(progress) => progress.stage(what),
+        None => println!("{}", stage_line(what, started)),
     };
-    let mut mended = darn_mend::mend(&scan, &constraints, call).or_fail(format!("mend {name}"))?;
-    darn_mend::add_read_time(&mut mended.report.timings, read);
-    progress.stage("writing");
-    if let Some(packed) = files::write_scan(&args.output, &scan, &mended.bytes)? {
-        mended.report.output = Some(packed);
-    }
-    let report = files::json(&mended.report, "write the report")?;
-    if let Some(path) = &args.report {
-        files::write(path, &report)?;
-    }
-    if let Some(path) = &args.provenance {
-        write_provenance(path, args, &mended.report, &report)?;
-    }
+    stage("loading weights");
+    let mended = FileMender::new(args)
+        .and_then(|mender| mender.mend(scan, &args.output, args.report.as_deref(), &stage));
     drop(progress);
-    print!("{}", summary(&mended.report));
+    if args.json_lines {
+        let outcome = mended.unwrap_or_else(FileOutcome::Failed);
+        let line = ReportLine::new(scan, &args.output, outcome, started);
+        println!("{}", line.text()?);
+        return line.outcome.into_result();
+    }
+    match mended? {
+        FileOutcome::Mended(report) => print!("{}", summary(&report)),
+        _ => println!("the scan has no holes and was copied"),
+    }
     Ok(())
+}
+
+/// What mends scans in files, with the settings of a command.
+pub struct FileMender<'a> {
+    args: &'a InpaintArgs,
+    constraints: Constraints,
+    mender: NetworkMender,
+}
+
+impl<'a> FileMender<'a> {
+    /// Loads the weights.
+    pub fn new(args: &'a InpaintArgs) -> Result<Self, Failure> {
+        let constraints = match &args.constraints {
+            Some(path) => constraints(path)?,
+            None => Constraints::default(),
+        };
+        let mut mender = mender(&args.network)?;
+        args.texture.apply(&mut mender);
+        Ok(FileMender {
+            args,
+            constraints,
+            mender,
+        })
+    }
+
+    /// Mends a scan; `stage` is told what begins.
+    pub fn mend(
+        &self,
+        scan: &Path,
+        output: &Path,
+        report: Option<&Path>,
+        stage: &dyn Fn(&str),
+    ) -> Result<FileOutcome, Failure> {
+        stage("reading");
+        let budget = self.args.deadline.budget();
+        let started = Instant::now();
+        let read_scan = files::read_scan(scan, &self.args.size, &budget)?;
+        let read = started.elapsed();
+        stage("mending");
+        let call = Call {
+            mender: &self.mender,
+            budget: &budget,
+        };
+        let mut mended = match darn_mend::mend(&read_scan, &self.constraints, call) {
+            Err(MendError::NoHoles { .. }) if self.args.if_no_holes == IfNoHoles::Copy => {
+                stage("copying");
+                files::write(output, &files::read(scan)?)?;
+                return Ok(FileOutcome::Copied);
+            }
+            mended => mended.or_fail(format!("mend {}", scan.display()))?,
+        };
+        darn_mend::add_read_time(&mut mended.report.timings, read);
+        stage("writing");
+        // The scan last: in a batch one that is there is done.
+        let packed = files::packed_scan(output, &read_scan, &mended.bytes)?;
+        if let Some(packed) = &packed {
+            mended.report.output = Some(darn_mend::file_digests(packed));
+        }
+        let text = files::json(&mended.report, "write the report")?;
+        if let Some(path) = report {
+            files::write(path, &text)?;
+        }
+        if let Some(path) = &self.args.provenance {
+            write_provenance(path, self.args, &mended.report, &text)?;
+        }
+        match packed {
+            Some(packed) => files::write(output, &packed)?,
+            None => files::write_scan(output, &read_scan, &mended.bytes)?,
+        }
+        Ok(FileOutcome::Mended(Box::new(mended.report)))
+    }
+}
+
+/// How the mend of a file went.
+pub enum FileOutcome {
+    /// Its holes were filled.
+    Mended(Box<Report>),
+    /// It has no holes, and was copied.
+    Copied,
+    /// Its output was there already.
+    DoneBefore,
+    /// It failed.
+    Failed(Failure),
+}
+
+impl FileOutcome {
+    /// The outcome as lines of JSON name it.
+    fn word(&self) -> &'static str {
+        match self {
+            FileOutcome::Mended(_) => "mended",
+            FileOutcome::Copied => "copied",
+            FileOutcome::DoneBefore => "done_before",
+            FileOutcome::Failed(_) => "failed",
+        }
+    }
+
+    /// Whether it failed.
+    pub fn is_failure(&self) -> bool {
+        matches!(self, FileOutcome::Failed(_))
+    }
+
+    fn into_result(self) -> Result<(), Failure> {
+        match self {
+            FileOutcome::Failed(failure) => Err(failure),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The line of JSON about a file.
+pub struct ReportLine {
+    scan: PathBuf,
+    output: PathBuf,
+    /// How it went.
+    pub outcome: FileOutcome,
+    seconds: f64,
+}
+
+impl ReportLine {
+    /// What is to be told of a mend that began at an instant.
+    pub fn new(scan: &Path, output: &Path, outcome: FileOutcome, started: Instant) -> Self {
+        ReportLine {
+            scan: scan.to_owned(),
+            output: output.to_owned(),
+            outcome,
+            seconds: started.elapsed().as_secs_f64(),
+        }
+    }
+
+    /// The line, without its end.
+    pub fn text(&self) -> Result<String, Failure> {
+        let mut line = serde_json::json!({
+            "type": "report",
+            "scan": self.scan.to_string_lossy(),
+            "output": self.output.to_string_lossy(),
+            "status": self.outcome.word(),
+            "seconds": (self.seconds * 1e3).round() / 1e3,
+        });
+        match &self.outcome {
+            FileOutcome::Mended(report) => {
+                let outcome = Outcome::of(report);
+                line["filled"] = outcome.filled.into();
+                line["skipped"] = outcome.skipped.into();
+                line["doubtful"] = outcome.doubtful.into();
+                line["report"] = serde_json::to_value(report).or_fail("write the report")?;
+            }
+            FileOutcome::Failed(failure) => {
+                line["code"] = failure.mend_code().map(|code| code.word).into();
+                line["detail"] = failure.to_string().into();
+            }
+            FileOutcome::Copied | FileOutcome::DoneBefore => {}
+        }
+        Ok(line.to_string())
+    }
+}
+
+/// The line of JSON about a stage that begins.
+fn stage_line(stage: &str, started: Instant) -> String {
+    let seconds = (started.elapsed().as_secs_f64() * 1e3).round() / 1e3;
+    serde_json::json!({"type": "stage", "stage": stage, "seconds": seconds}).to_string()
 }
 
 /// Writes the provenance of a mend; `text` is its report as it was written.
@@ -101,7 +272,7 @@ fn write_provenance(
     let log = args.report.as_deref().map(name);
     let document = provenance::document(&provenance::Mend {
         report,
-        input: &name(&args.scan),
+        input: &name(args.scan.as_deref().unwrap_or(Path::new(""))),
         output: &name(&args.output),
         constraints: &constraints,
         log: log.as_deref().map(|log| (log, text)),

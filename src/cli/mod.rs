@@ -3,6 +3,7 @@
 //! Exit codes: 0 done, 1 failed, 64 wrong usage or settings. Geometry, HTTP routes and training belong to the crates,
 //! not here.
 
+mod batch;
 mod bench;
 #[cfg(feature = "burn")]
 mod evaluate;

@@ -71,7 +71,10 @@ pub fn run(args: &OptimizeAnchorArgs) -> Result<(), Failure> {
         progress.stage("mending");
         let anchor = darn_mend::anchor_of(&found, &search);
         let mended = darn_mend::mend(&scan, &anchor, call()).or_fail(format!("mend {name}"))?;
-        files::write_scan(path, &scan, &mended.bytes)?;
+        match files::packed_scan(path, &scan, &mended.bytes)? {
+            Some(packed) => files::write(path, &packed)?,
+            None => files::write_scan(path, &scan, &mended.bytes)?,
+        }
     }
     drop(progress);
     let json = serde_json::to_string_pretty(&found).or_fail("write the answer")?;

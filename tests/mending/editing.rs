@@ -377,8 +377,15 @@ fn a_session_answers_as_single_calls_do() {
             amount: 0.3,
         }])
     };
+    // The same point of the cloth, dragged on: the session asks the network for less then.
+    let dragged = Constraints {
+        anchors: vec![cloth.anchor(cloth.vertex([0.2, 0.0]), Vec3::y() * (1.5 * cloth.cell))],
+        ..asked.clone()
+    };
     for constraints in [
         Constraints::default(),
+        asked.clone(),
+        dragged,
         asked.clone(),
         Constraints::default(),
     ] {

@@ -10,6 +10,7 @@ mod editing;
 #[path = "../../crates/gltf-scan/src/compressed/encoded.rs"]
 mod encoded;
 mod laws;
+mod mesh_files;
 mod patched;
 mod ragged;
 mod requests;

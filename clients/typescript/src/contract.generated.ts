@@ -1092,7 +1092,7 @@ export interface components {
          * @description The words of this version; later ones may have more
          * @enum {string}
          */
-        ProblemCode: "empty_body" | "malformed_request" | "digest_mismatch" | "no_query" | "not_found" | "method_not_allowed" | "body_timeout" | "body_too_large" | "message_too_large" | "constraints_too_large" | "query_too_large" | "unsupported_content_encoding" | "unsupported_media_type" | "invalid_constraints" | "invalid_query" | "session_not_found" | "session_expired" | "session_evicted" | "session_deleted" | "session_too_large" | "session_busy" | "sessions_full" | "jobs_not_kept" | "no_such_job" | "job_unfinished" | "job_wrong_state" | "job_expired" | "idempotency_mismatch" | "job_crashed_worker" | "storage_full" | "internal" | "queue_full" | "memory_full" | "uploads_full" | "draining" | "warming_up" | "deadline_exceeded" | "not_a_gltf" | "invalid_gltf" | "scan_too_large" | "index_out_of_range" | "position_not_finite" | "unsupported_extension" | "external_data" | "no_triangles" | "singular_transform" | "constraints_do_not_fit" | "anchor_out_of_reach" | "too_much_work" | "too_much_memory" | "answer_too_large" | "no_holes" | "nothing_to_strip" | "too_many_holes" | "non_manifold_rim" | "coordinates_too_large" | "not_a_disk" | "not_cloth_like" | "too_little_known" | "rim_crosses_itself" | "patch_degenerate" | "no_plausible_fill" | "hole_too_narrow";
+        ProblemCode: "empty_body" | "malformed_request" | "digest_mismatch" | "no_query" | "not_found" | "method_not_allowed" | "body_timeout" | "body_too_large" | "message_too_large" | "constraints_too_large" | "query_too_large" | "unsupported_content_encoding" | "unsupported_media_type" | "invalid_constraints" | "invalid_query" | "session_not_found" | "session_expired" | "session_evicted" | "session_deleted" | "session_too_large" | "session_busy" | "sessions_full" | "jobs_not_kept" | "no_such_job" | "job_unfinished" | "job_wrong_state" | "job_expired" | "idempotency_mismatch" | "job_crashed_worker" | "storage_full" | "internal" | "queue_full" | "memory_full" | "uploads_full" | "draining" | "warming_up" | "deadline_exceeded" | "not_a_gltf" | "invalid_gltf" | "invalid_mesh_file" | "scan_too_large" | "index_out_of_range" | "position_not_finite" | "unsupported_extension" | "external_data" | "no_triangles" | "singular_transform" | "constraints_do_not_fit" | "anchor_out_of_reach" | "too_much_work" | "too_much_memory" | "answer_too_large" | "no_holes" | "nothing_to_strip" | "too_many_holes" | "non_manifold_rim" | "coordinates_too_large" | "not_a_disk" | "not_cloth_like" | "too_little_known" | "rim_crosses_itself" | "patch_degenerate" | "no_plausible_fill" | "hole_too_narrow";
         /** @description The version, and the limits that a client can check before it sends a scan */
         Info: {
             /** @description darn's version */
@@ -1133,10 +1133,12 @@ export interface operations {
             content: {
                 "model/gltf-binary": unknown;
                 "model/gltf+json": unknown;
+                "model/obj": unknown;
+                "model/ply": unknown;
                 "application/zip": unknown;
                 "application/octet-stream": unknown;
                 "multipart/form-data": {
-                    /** @description GLB; glTF, with further parts for the files that it refers to, each named by its URI in the glTF; or a zip with a glTF and its files */
+                    /** @description GLB; glTF, with further parts for the files that it refers to, each named by its URI in the glTF; a zip with a glTF and its files; OBJ; or PLY */
                     scan: unknown;
                     constraints?: components["schemas"]["Constraints"];
                 };
@@ -1161,6 +1163,8 @@ export interface operations {
                 content: {
                     "model/gltf-binary": unknown;
                     "model/gltf+json": unknown;
+                    "model/obj": unknown;
+                    "model/ply": unknown;
                     "application/zip": unknown;
                     "multipart/mixed": {
                         report?: components["schemas"]["Report"];
@@ -1267,10 +1271,12 @@ export interface operations {
             content: {
                 "model/gltf-binary": unknown;
                 "model/gltf+json": unknown;
+                "model/obj": unknown;
+                "model/ply": unknown;
                 "application/zip": unknown;
                 "application/octet-stream": unknown;
                 "multipart/form-data": {
-                    /** @description GLB; glTF, with further parts for the files that it refers to, each named by its URI in the glTF; or a zip with a glTF and its files */
+                    /** @description GLB; glTF, with further parts for the files that it refers to, each named by its URI in the glTF; a zip with a glTF and its files; OBJ; or PLY */
                     scan: unknown;
                 };
             };
@@ -1369,7 +1375,7 @@ export interface operations {
         requestBody: {
             content: {
                 "multipart/form-data": {
-                    /** @description GLB; glTF, with further parts for the files that it refers to, each named by its URI in the glTF; or a zip with a glTF and its files */
+                    /** @description GLB; glTF, with further parts for the files that it refers to, each named by its URI in the glTF; a zip with a glTF and its files; OBJ; or PLY */
                     scan: unknown;
                     query: components["schemas"]["AnchorQuery"];
                 };
@@ -1385,6 +1391,8 @@ export interface operations {
                     "application/json": components["schemas"]["AnchorFound"];
                     "model/gltf-binary": unknown;
                     "model/gltf+json": unknown;
+                    "model/obj": unknown;
+                    "model/ply": unknown;
                     "application/zip": unknown;
                     "multipart/mixed": {
                         report?: components["schemas"]["Report"];
@@ -1477,10 +1485,12 @@ export interface operations {
             content: {
                 "model/gltf-binary": unknown;
                 "model/gltf+json": unknown;
+                "model/obj": unknown;
+                "model/ply": unknown;
                 "application/zip": unknown;
                 "application/octet-stream": unknown;
                 "multipart/form-data": {
-                    /** @description GLB; glTF, with further parts for the files that it refers to, each named by its URI in the glTF; or a zip with a glTF and its files */
+                    /** @description GLB; glTF, with further parts for the files that it refers to, each named by its URI in the glTF; a zip with a glTF and its files; OBJ; or PLY */
                     scan: unknown;
                 };
             };
@@ -1498,6 +1508,8 @@ export interface operations {
                 content: {
                     "model/gltf-binary": unknown;
                     "model/gltf+json": unknown;
+                    "model/obj": unknown;
+                    "model/ply": unknown;
                     "application/zip": unknown;
                     "multipart/mixed": {
                         report?: components["schemas"]["StripReport"];
@@ -1590,10 +1602,12 @@ export interface operations {
             content: {
                 "model/gltf-binary": unknown;
                 "model/gltf+json": unknown;
+                "model/obj": unknown;
+                "model/ply": unknown;
                 "application/zip": unknown;
                 "application/octet-stream": unknown;
                 "multipart/form-data": {
-                    /** @description GLB; glTF, with further parts for the files that it refers to, each named by its URI in the glTF; or a zip with a glTF and its files */
+                    /** @description GLB; glTF, with further parts for the files that it refers to, each named by its URI in the glTF; a zip with a glTF and its files; OBJ; or PLY */
                     scan: unknown;
                     constraints?: components["schemas"]["Constraints"];
                 };
@@ -2250,10 +2264,12 @@ export interface operations {
             content: {
                 "model/gltf-binary": unknown;
                 "model/gltf+json": unknown;
+                "model/obj": unknown;
+                "model/ply": unknown;
                 "application/zip": unknown;
                 "application/octet-stream": unknown;
                 "multipart/form-data": {
-                    /** @description GLB; glTF, with further parts for the files that it refers to, each named by its URI in the glTF; or a zip with a glTF and its files */
+                    /** @description GLB; glTF, with further parts for the files that it refers to, each named by its URI in the glTF; a zip with a glTF and its files; OBJ; or PLY */
                     scan: unknown;
                     constraints?: components["schemas"]["Constraints"];
                 };

@@ -148,6 +148,8 @@ codes! {
     NOT_A_GLTF = "not_a_gltf", 400, InvalidArgument;
     /// A glTF that contradicts itself or its specification.
     INVALID_GLTF = "invalid_gltf", 400, InvalidArgument;
+    /// An OBJ or a PLY that breaks a rule of its format.
+    INVALID_MESH_FILE = "invalid_mesh_file", 400, InvalidArgument;
     /// The scan decodes to more than a limit allows.
     SCAN_TOO_LARGE = "scan_too_large", 413, ResourceExhausted;
     /// A triangle names a vertex that does not exist.

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use darn_mesh_files::MeshFormat;
+
 use super::error::ScanError;
 
 /// The container of a scan. Its first bytes decide, not a file name or media type.
@@ -13,6 +15,10 @@ pub enum Container {
     Gltf,
     /// A zip with one of these and the files that it refers to.
     Zip,
+    /// Wavefront OBJ; its materials and images are other files, which stay as they are.
+    Obj,
+    /// The Polygon File Format.
+    Ply,
 }
 
 impl Container {
@@ -22,6 +28,8 @@ impl Container {
             Self::Glb => "model/gltf-binary",
             Self::Gltf => "model/gltf+json",
             Self::Zip => "application/zip",
+            Self::Obj => MeshFormat::Obj.media_type(),
+            Self::Ply => MeshFormat::Ply.media_type(),
         }
     }
 }

@@ -51,8 +51,12 @@ impl Scan {
     /// [`spread_to_instances`](Scan::spread_to_instances) first: a triangle is drawn by all nodes of its mesh or by none.
     ///
     /// # Errors
-    /// [`ScanError::Unsupported`] for a primitive whose triangles are compressed; `Exhausted`.
+    /// [`ScanError::Unsupported`] for a primitive whose triangles are compressed, [`ScanError::NotCut`] for an OBJ or a
+    /// PLY; `Exhausted`.
     pub fn without_faces(&self, cut: &[bool], budget: &Budget) -> Result<Scan, ScanError> {
+        if self.origin.is_some() {
+            return Err(ScanError::NotCut);
+        }
         budget.hold(self.decoded_bytes() + self.json_held)?;
         budget.spend(FACE_WORK * self.surface.faces.len() as u64)?;
         let mut scan = self.clone();

@@ -3,6 +3,7 @@
 //! Every variant about the file carries an RFC 6901 pointer into its JSON, so that a person can find the place.
 
 use darn_budget::Exhausted;
+use darn_mesh_files::MeshFileError;
 
 use super::content::SceneContent;
 use super::json::JsonPlace;
@@ -89,6 +90,15 @@ pub enum ScanError {
         /// What was found: the count up to this place, inclusive.
         found: usize,
     },
+    /// An OBJ or a PLY that breaks a rule of its format.
+    #[error(transparent)]
+    MeshFile(MeshFileError),
+    /// An OBJ or a PLY is to be written as a glTF.
+    #[error("an OBJ or a PLY is written in its own format, not as a GLB")]
+    NotPacked,
+    /// Triangles are to be cut out of an OBJ or a PLY.
+    #[error("triangles cannot be cut out of an OBJ or a PLY; send the scan as a glTF")]
+    NotCut,
     /// The request's budget is exhausted.
     #[error(transparent)]
     Exhausted(#[from] Exhausted),
@@ -116,6 +126,15 @@ pub enum ScanError {
     },
 }
 
+impl From<MeshFileError> for ScanError {
+    fn from(error: MeshFileError) -> Self {
+        match error {
+            MeshFileError::Exhausted(exhausted) => Self::Exhausted(exhausted),
+            error => Self::MeshFile(error),
+        }
+    }
+}
+
 impl ScanError {
     /// The error of a file that is not there; `uri` is the place of its URI.
     pub(super) fn external(uri: &JsonPlace<'_>) -> Self {
@@ -139,6 +158,9 @@ impl ScanError {
             | Self::External { pointer, .. }
             | Self::Limit { pointer, .. } => Some(pointer),
             Self::Container { .. }
+            | Self::MeshFile(_)
+            | Self::NotCut
+            | Self::NotPacked
             | Self::Exhausted(_)
             | Self::NoTriangles { .. }
             | Self::Singular { .. }

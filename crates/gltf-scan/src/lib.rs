@@ -1,7 +1,7 @@
 //! Reads glTF scans as one list of triangles, and writes them back with patches appended and nothing else changed.
 //!
 //! This is the only crate that knows glTF. A scan is a GLB; glTF JSON, with its buffers as data URIs or as files that the
-//! caller gives with it; or a zip with one of these and its files. Its geometry may be
+//! caller gives with it; a zip with one of these and its files; or a mesh as OBJ or PLY. A glTF's geometry may be
 //! plain, quantized (`KHR_mesh_quantization`) or compressed (`KHR_draco_mesh_compression`, `EXT_meshopt_compression`,
 //! `KHR_meshopt_compression`); patches are plain floats. The crate opens no file and no URL, and checks every count
 //! against the bytes behind it before it allocates. It does not weld vertices and does not look for holes.
@@ -35,6 +35,7 @@ mod json;
 mod json_edit;
 mod left_out;
 mod limits;
+mod mesh_file;
 mod pack;
 mod patch_appearance;
 mod patch_group;
@@ -73,6 +74,7 @@ mod zip_undo;
 pub use cloth_look::{ClothLook, LookLayer, NoLook, TextureSource, TextureWrap};
 pub use container::Container;
 pub use content::SceneContent;
+pub use darn_mesh_files::MeshFileError;
 pub use digests::FileDigests;
 pub use error::ScanError;
 pub use files::{Siblings, sibling_paths};

@@ -18,8 +18,11 @@ impl Scan {
     /// A mended scan ([`Scan::write`]) as one GLB with all its files in it; one that is a GLB already stays.
     ///
     /// # Errors
-    /// A buffer's file is missing; the GLB would be too large.
+    /// A buffer's file is missing; the GLB would be too large; an OBJ or a PLY.
     pub fn packed(&self, mended: &[u8]) -> Result<Vec<u8>, ScanError> {
+        if self.origin.is_some() {
+            return Err(ScanError::NotPacked);
+        }
         let limits = ScanLimits::default();
         let allowance = DecodeAllowance::new(&limits, Budget::unlimited());
         match (&self.companions, self.layout.container) {

@@ -20,6 +20,7 @@ use super::error::ScanError;
 use super::files::{Companions, Siblings};
 use super::json::{JsonPlace, json_held, values_at_most};
 use super::limits::{Limit, ScanLimits};
+use super::mesh_file::read_mesh_file;
 use super::patch_primitive::is_reconstructed;
 use super::primitive::{AttributeSource, ElementsKey, PrimitiveSource};
 use super::scan::{Scan, ScanPart, VertexBlock};
@@ -28,9 +29,10 @@ use super::skin::skinned_meshes;
 use super::triangles::IndexList;
 use super::zip_files::{self, ZipFiles};
 use darn_geometry::mesh::{TriMesh, Vec3};
+use darn_mesh_files::MeshFormat;
 
 impl Scan {
-    /// Reads a scan. Its first bytes decide between GLB, JSON and zip; data is read from the BIN chunk, data URIs and the zip.
+    /// Reads a scan. Its first bytes decide between GLB, JSON, zip, OBJ and PLY; data is read from the BIN chunk, data URIs and the zip.
     ///
     /// The scan keeps `bytes` and does not copy them (a `Vec<u8>` is taken over, a slice needs
     /// [`Bytes::copy_from_slice`]). Further memory: about 100 bytes a JSON value, 36 a vertex, 12 a face and 4 an
@@ -90,11 +92,14 @@ fn read(
         let main = zip.main(&allowance)?;
         return read_files(main, Companions::Zip(zip), allowance);
     }
+    if let Some(format) = MeshFormat::of(&bytes) {
+        return read_mesh_file(bytes, format, allowance);
+    }
     read_files(bytes, Companions::Siblings(siblings), allowance)
 }
 
 /// Reads a glTF and the files that it refers to.
-fn read_files(
+pub(super) fn read_files(
     bytes: Bytes,
     companions: Companions,
     allowance: DecodeAllowance<'_>,
@@ -145,6 +150,7 @@ fn read_files(
         json,
         cut: BTreeSet::new(),
         json_held,
+        origin: None,
         digests: Arc::default(),
     };
     budget.hold(scan.unpacked_bytes())?;

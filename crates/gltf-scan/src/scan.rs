@@ -12,6 +12,7 @@ use serde_json::Value;
 use super::container::{Container, ContainerLayout};
 use super::digests::FileDigests;
 use super::files::{Companions, Siblings};
+use super::mesh_file::MeshOrigin;
 use super::scene::NodeTransform;
 use super::skin::{Influence, Influences};
 
@@ -36,7 +37,9 @@ pub struct Scan {
     pub(crate) cut: BTreeSet<(usize, usize)>,
     /// Bytes of memory that the parsed JSON takes.
     pub(crate) json_held: usize,
-    /// The digests of `bytes`, made when they are first asked for.
+    /// The mesh file that it was read from: then `bytes` are a glTF of the same triangles.
+    pub(crate) origin: Option<Arc<MeshOrigin>>,
+    /// The digests of the file, made when they are first asked for.
     pub(crate) digests: Arc<OnceLock<FileDigests>>,
 }
 
@@ -94,8 +97,9 @@ pub(crate) struct VertexBlock {
 impl Scan {
     /// The container it was read from; [`Scan::write`] writes the same.
     pub fn container(&self) -> Container {
-        match self.companions {
-            Companions::Zip(_) => Container::Zip,
+        match (&self.origin, &self.companions) {
+            (Some(origin), _) => origin.container(),
+            (None, Companions::Zip(_)) => Container::Zip,
             _ => self.layout.container,
         }
     }
@@ -125,7 +129,12 @@ impl Scan {
 
     /// Memory it holds, in bytes, estimated.
     pub fn bytes_held(&self) -> usize {
-        self.bytes.len() + self.companions.bytes_held() + self.json_held + self.decoded_bytes()
+        let origin = self.origin.as_ref().map_or(0, |origin| origin.bytes_held());
+        self.bytes.len()
+            + self.companions.bytes_held()
+            + self.json_held
+            + self.decoded_bytes()
+            + origin
     }
 
     /// Memory of the decoded geometry and attributes.

@@ -6,6 +6,7 @@
 
 use bytes::Bytes;
 use darn_budget::Budget;
+use darn_mesh_files::MeshFormat;
 use serde_json::Value;
 
 use super::compressed::DecodeAllowance;
@@ -13,6 +14,7 @@ use super::container::{self, Container};
 use super::digests::FileDigests;
 use super::error::ScanError;
 use super::limits::ScanLimits;
+use super::mesh_file::stripped_mesh_file;
 use super::read::parsed_json;
 use super::undo::{Undone, undone};
 use super::unmarked::{Marks, without_marks};
@@ -58,6 +60,8 @@ pub fn stripped(
     budget.hold(COPIES * bytes.len())?;
     if bytes.starts_with(zip_files::MAGIC) {
         stripped_zip(bytes, &DecodeAllowance::new(limits, budget))
+    } else if let Some(format) = MeshFormat::of(&bytes) {
+        stripped_mesh_file(bytes, format, budget)
     } else {
         stripped_file(bytes, limits, budget)
     }

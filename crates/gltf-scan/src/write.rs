@@ -55,14 +55,22 @@ impl Scan {
     ) -> Result<WrittenScan, ScanError> {
         budget.spend(DIGEST_WORK * self.bytes.len() as u64)?;
         if patches.is_empty() && self.cut.is_empty() {
-            let bytes = match &self.companions {
-                Companions::Zip(zip) => &zip.bytes,
+            let bytes = match (&self.origin, &self.companions) {
+                (Some(origin), _) => origin.bytes(),
+                (None, Companions::Zip(zip)) => &zip.bytes,
                 _ => &self.bytes,
             };
             return Ok(WrittenScan {
                 bytes: bytes.to_vec(),
                 digests: self.digests().clone(),
             });
+        }
+        if let Some(origin) = &self.origin {
+            let bytes = origin.with_patches(self, patches);
+            budget.check_output(bytes.len())?;
+            budget.spend(DIGEST_WORK * bytes.len() as u64)?;
+            let digests = FileDigests::of(&bytes);
+            return Ok(WrittenScan { bytes, digests });
         }
         let mut out = Appender::new(self);
         cut_primitives(self, &mut out)?;
@@ -111,9 +119,13 @@ impl Scan {
         Ok(WrittenScan { bytes, digests })
     }
 
-    /// The digests of the glTF as it was read: the file, or the glTF in a zip.
+    /// The digests of the scan as it was read: the file, or the glTF in a zip.
     pub fn digests(&self) -> &FileDigests {
-        self.digests.get_or_init(|| FileDigests::of(&self.bytes))
+        let bytes = self
+            .origin
+            .as_ref()
+            .map_or(&self.bytes, |origin| origin.bytes());
+        self.digests.get_or_init(|| FileDigests::of(bytes))
     }
 
     /// The patches by the primitive that they share, in the order of each primitive's first patch.

@@ -5,7 +5,7 @@ use darn_contract::{Code, FieldError, codes, v1};
 use darn_geometry::flatten::FlattenError;
 use darn_geometry::mesh::region::RegionError;
 use darn_geometry::patch::PatchError;
-use darn_gltf_scan::ScanError;
+use darn_gltf_scan::{MeshFileError, ScanError};
 use darn_net::NetError;
 
 /// Why a scan could not be mended.
@@ -121,6 +121,39 @@ pub enum MendError {
     Picture(image::ImageError),
 }
 
+/// The row in the table of codes of a scan that cannot be read.
+pub fn reading_code(error: &ScanError) -> Code {
+    match error {
+        ScanError::Container { .. } => codes::NOT_A_GLTF,
+        ScanError::Invalid { .. } => codes::INVALID_GLTF,
+        ScanError::IndexOutOfRange { .. } => codes::INDEX_OUT_OF_RANGE,
+        ScanError::NotFinite { .. } => codes::POSITION_NOT_FINITE,
+        ScanError::Unsupported { .. } => codes::UNSUPPORTED_EXTENSION,
+        ScanError::External { .. } => codes::EXTERNAL_DATA,
+        ScanError::Limit { .. } | ScanError::MeshFile(MeshFileError::Limit { .. }) => {
+            codes::SCAN_TOO_LARGE
+        }
+        ScanError::MeshFile(_) => codes::INVALID_MESH_FILE,
+        ScanError::NoTriangles { .. } | ScanError::PointCloud { .. } => codes::NO_TRIANGLES,
+        ScanError::Singular { .. } => codes::SINGULAR_TRANSFORM,
+        ScanError::Exhausted(exhausted) => exhausted_code(exhausted),
+        ScanError::NotCut | ScanError::NotPacked | ScanError::InvalidPatch { .. } => {
+            codes::INTERNAL
+        }
+    }
+}
+
+fn exhausted_code(exhausted: &Exhausted) -> Code {
+    match exhausted {
+        Exhausted::Work { .. } => codes::TOO_MUCH_WORK,
+        Exhausted::Memory { .. } => codes::TOO_MUCH_MEMORY,
+        Exhausted::MemoryFull { .. } => codes::MEMORY_FULL,
+        Exhausted::Output { .. } => codes::ANSWER_TOO_LARGE,
+        // A caller who has left reads no code; one who still waits would wait for longer than the deadline.
+        Exhausted::Cancelled => codes::DEADLINE_EXCEEDED,
+    }
+}
+
 impl From<ScanError> for MendError {
     fn from(error: ScanError) -> MendError {
         match error {
@@ -166,18 +199,7 @@ impl MendError {
     /// The error's row in the table of codes. This is the only place that gives errors of mending their codes.
     pub fn code(&self) -> Code {
         match self {
-            MendError::Unreadable(error) => match error {
-                ScanError::Container { .. } => codes::NOT_A_GLTF,
-                ScanError::Invalid { .. } => codes::INVALID_GLTF,
-                ScanError::IndexOutOfRange { .. } => codes::INDEX_OUT_OF_RANGE,
-                ScanError::NotFinite { .. } => codes::POSITION_NOT_FINITE,
-                ScanError::Unsupported { .. } => codes::UNSUPPORTED_EXTENSION,
-                ScanError::External { .. } => codes::EXTERNAL_DATA,
-                ScanError::Limit { .. } => codes::SCAN_TOO_LARGE,
-                ScanError::NoTriangles { .. } | ScanError::PointCloud { .. } => codes::NO_TRIANGLES,
-                ScanError::Singular { .. } => codes::SINGULAR_TRANSFORM,
-                ScanError::InvalidPatch { .. } | ScanError::Exhausted(_) => codes::INTERNAL,
-            },
+            MendError::Unreadable(error) => reading_code(error),
             MendError::Constraints(_) => codes::CONSTRAINTS_DO_NOT_FIT,
             MendError::OutOfReach(_) => codes::ANCHOR_OUT_OF_REACH,
             MendError::NoHoles { .. } => codes::NO_HOLES,
@@ -200,14 +222,7 @@ impl MendError {
             MendError::NoCells { .. } => codes::HOLE_TOO_NARROW,
             MendError::NoPlausibleFill { .. } => codes::NO_PLAUSIBLE_FILL,
             MendError::NoneFilled { first, .. } => first.code(),
-            MendError::Exhausted(exhausted) => match exhausted {
-                Exhausted::Work { .. } => codes::TOO_MUCH_WORK,
-                Exhausted::Memory { .. } => codes::TOO_MUCH_MEMORY,
-                Exhausted::MemoryFull { .. } => codes::MEMORY_FULL,
-                Exhausted::Output { .. } => codes::ANSWER_TOO_LARGE,
-                // A caller who has left reads no code; one who still waits would wait for longer than the deadline.
-                Exhausted::Cancelled => codes::DEADLINE_EXCEEDED,
-            },
+            MendError::Exhausted(exhausted) => exhausted_code(exhausted),
             MendError::Net(_) | MendError::Scan(_) | MendError::Picture(_) => codes::INTERNAL,
         }
     }

@@ -7,6 +7,7 @@ use crate::edit::{HoleCells, ReachLimit};
 use crate::error::MendError;
 use crate::inpainter::{FillKey, Inpainter};
 use crate::mender::Call;
+use crate::moved_fill::LastHeldFill;
 use crate::network_share::WidenedHole;
 use crate::texture::HoleTextures;
 use crate::timings::milliseconds;
@@ -78,6 +79,8 @@ pub struct UneditedCloth {
     pub predicted: Vec<Vec3>,
     /// For every cell the scan's position where it is known, the network's elsewhere; scene space.
     pub filled: Vec<Vec3>,
+    /// What the network says of the cells that were moved last.
+    pub held: LastHeldFill,
     /// The patch made of it.
     pub patch: Patch,
     /// Milliseconds of the network.
@@ -139,6 +142,7 @@ impl Hole {
             network_share,
             predicted,
             filled,
+            held: LastHeldFill::default(),
             patch,
             net_ms,
             patch_ms: milliseconds(started),
@@ -240,7 +244,7 @@ impl UneditedCloths {
         let kept = self.lock();
         let each = kept
             .iter()
-            .map(|(_, u)| 2 * 24 * CELLS + 40 * u.patch.positions.len() + 12 * u.patch.faces.len());
+            .map(|(_, u)| 3 * 24 * CELLS + 40 * u.patch.positions.len() + 12 * u.patch.faces.len());
         each.sum()
     }
 

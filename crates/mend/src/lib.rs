@@ -73,7 +73,7 @@ use darn_gltf_scan::Scan;
 pub use call_pools::CallPools;
 pub use digests::file_digests;
 pub use edit::SearchOptions;
-pub use error::MendError;
+pub use error::{MendError, reading_code};
 pub use limits::{EditedFill, MendLimits};
 pub use mender::{Call, NetworkMender};
 pub use port::SharedMender;

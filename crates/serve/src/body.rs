@@ -16,7 +16,7 @@ use super::{
     counted::{CountedBytes, counted, take},
     digest::ExpectedDigests,
     error::RequestError,
-    media_types::{FORM_DATA, FORM_URLENCODED, GLB, GLTF, JSON, OCTET_STREAM, ZIP},
+    media_types::{FORM_DATA, FORM_URLENCODED, GLB, GLTF, JSON, OBJ, OCTET_STREAM, PLY, ZIP},
     pace::{PaceLimits, TooSlow},
     parameters::{self, Parameters},
     scan_files::{self, ScanFiles, looks_like_a_scan},
@@ -28,12 +28,12 @@ const DRAIN_FACTOR: u64 = 4;
 /// Longest time for which an unwanted body is read and dropped.
 const DRAIN_TIME: Duration = Duration::from_secs(2);
 /// The media types of a body with a scan, for an error's text.
-const SCAN_BODY_MEDIA_TYPES: &str =
-    "model/gltf-binary, model/gltf+json, application/zip or multipart/form-data";
+const SCAN_BODY_MEDIA_TYPES: &str = "model/gltf-binary, model/gltf+json, model/obj, model/ply, application/zip or multipart/form-data";
 /// The media types of the part `scan`, for an error's text.
-const SCAN_PART_MEDIA_TYPES: &str = "model/gltf-binary, model/gltf+json or application/zip";
+const SCAN_PART_MEDIA_TYPES: &str =
+    "model/gltf-binary, model/gltf+json, model/obj, model/ply or application/zip";
 /// The media types that the part `scan` is read from. `application/octet-stream` is what curl declares for any file.
-const SCAN_PART_READ: [&str; 4] = [GLB, GLTF, ZIP, OCTET_STREAM];
+const SCAN_PART_READ: [&str; 6] = [GLB, GLTF, OBJ, PLY, ZIP, OCTET_STREAM];
 
 /// A request with a scan.
 #[derive(Debug)]
@@ -295,7 +295,7 @@ fn discard_body(headers: &HeaderMap, mut body: Body, limits: &RequestLimits) {
 
 fn scan_body(headers: &HeaderMap) -> Result<ScanBody, RequestError> {
     match essence(content_type(headers)).as_str() {
-        GLB | GLTF | ZIP => Ok(ScanBody::Bare),
+        GLB | GLTF | OBJ | PLY | ZIP => Ok(ScanBody::Bare),
         "" | OCTET_STREAM | FORM_URLENCODED => Ok(ScanBody::Untold),
         FORM_DATA => Ok(ScanBody::Form),
         _ => Err(unsupported(headers, SCAN_BODY_MEDIA_TYPES)),

@@ -6,6 +6,10 @@ pub const GLB: &str = "model/gltf-binary";
 pub const GLTF: &str = "model/gltf+json";
 /// A zip with a glTF and the files that it refers to.
 pub const ZIP: &str = "application/zip";
+/// A Wavefront OBJ.
+pub const OBJ: &str = "model/obj";
+/// A PLY; no media type of it is registered.
+pub const PLY: &str = "model/ply";
 /// JSON.
 pub const JSON: &str = "application/json";
 /// Bytes of no stated type: positions in answers; what curl declares for any file in requests.

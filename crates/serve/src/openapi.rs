@@ -8,7 +8,8 @@ use serde_json::{Map, Value, json};
 
 use super::{
     media_types::{
-        FORM_DATA, GLB, GLTF, JSON, MULTIPART_MIXED, OCTET_STREAM, PROBLEM_JSON, TEXT, ZIP,
+        FORM_DATA, GLB, GLTF, JSON, MULTIPART_MIXED, OBJ, OCTET_STREAM, PLY, PROBLEM_JSON, TEXT,
+        ZIP,
     },
     response, schema,
 };
@@ -87,7 +88,7 @@ fn inpaint() -> Value {
                     glTF alone (from parts), or as `Accept` prefers: application/zip, model/gltf+json, or model/gltf-binary for one GLB with \
                     all files in it",
                 "scan",
-                &[GLB, GLTF, ZIP],
+                &[GLB, GLTF, OBJ, PLY, ZIP],
             ),
             "A scan or constraints that cannot be mended; `errors` names the constraints. With code `no_holes`: the scan has no \
                 hole to fill",
@@ -99,14 +100,14 @@ fn inpaint() -> Value {
 
 fn optimize_anchor() -> Value {
     let mut found = found();
-    let mended = mended("", "scan", &[GLB, GLTF, ZIP]);
+    let mended = mended("", "scan", &[GLB, GLTF, OBJ, PLY, ZIP]);
     found["description"] = format!(
         "{}. With `Accept: model/gltf-binary`: the scan mended with that anchor, in the container of the input; with \
             `Accept: multipart/mixed`: the part `report` (application/json, schema Report), then the part `scan`",
         found["description"].as_str().unwrap_or_default()
     )
     .into();
-    for media_type in [GLB, GLTF, ZIP, MULTIPART_MIXED] {
+    for media_type in [GLB, GLTF, OBJ, PLY, ZIP, MULTIPART_MIXED] {
         found["content"][media_type] = mended["content"][media_type].clone();
     }
     json!({
@@ -125,7 +126,7 @@ fn strip() -> Value {
     let mut found = mended(
         "The scan without what darn put in, in the container of the input; one that came with its files goes back as a mended one does",
         "scan",
-        &[GLB, GLTF, ZIP],
+        &[GLB, GLTF, OBJ, PLY, ZIP],
     );
     found["content"][MULTIPART_MIXED]["schema"]["properties"]["report"] = reference("StripReport");
     found["headers"] = json!({ "repr-digest": repr_digest(), "darn-strip": {
@@ -213,8 +214,8 @@ fn holes() -> Value {
 /// A request body with a scan: alone, or with other parts in multipart/form-data; only as the latter when one of them is required.
 fn body(beside: &[(&str, &str)], required: &[&str]) -> Value {
     let mut parts = json!({ "scan": { "description": "GLB; glTF, with further parts for the files that it refers to, each named by its URI \
-        in the glTF; or a zip with a glTF and its files" } });
-    let mut encoding = json!({ "scan": { "contentType": "model/gltf-binary, model/gltf+json, application/zip, application/octet-stream" } });
+        in the glTF; a zip with a glTF and its files; OBJ; or PLY" } });
+    let mut encoding = json!({ "scan": { "contentType": "model/gltf-binary, model/gltf+json, model/obj, model/ply, application/zip, application/octet-stream" } });
     for (part, schema) in beside {
         parts[*part] = reference(schema);
         encoding[*part] = json!({ "contentType": "application/json, application/octet-stream" });
@@ -225,7 +226,7 @@ fn body(beside: &[(&str, &str)], required: &[&str]) -> Value {
         "encoding": encoding,
     });
     let content = if required.is_empty() {
-        json!({ GLB: {}, GLTF: {}, ZIP: {}, OCTET_STREAM: {}, FORM_DATA: form })
+        json!({ GLB: {}, GLTF: {}, OBJ: {}, PLY: {}, ZIP: {}, OCTET_STREAM: {}, FORM_DATA: form })
     } else {
         json!({ FORM_DATA: form })
     };

@@ -27,7 +27,7 @@ use super::{
     job_events::LAST_EVENT_ID,
     job_request::IDEMPOTENCY_KEY,
     job_routes,
-    media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, PROMETHEUS, ZIP},
+    media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, OBJ, PLY, PROMETHEUS, ZIP},
     openapi, parameters,
     prefer::{PREFER, PREFERENCE_APPLIED, Preferences},
     response::{self, ANCHOR_DISTANCE, HOLES_FILLED, LOOPS_SKIPPED, MendResponse, RESULT, STRIP},
@@ -236,7 +236,7 @@ async fn optimize_anchor(
     } = body::receive_scan::<Search>(&app, request).await?;
     let place = "the part `query` of multipart/form-data, beside the part `scan`";
     let search = parameters.ok_or(RequestError::NoQuery { place })?;
-    if preferred(&headers, &[JSON, GLB, GLTF, ZIP, MULTIPART_MIXED]) == JSON {
+    if preferred(&headers, &[JSON, GLB, GLTF, OBJ, PLY, ZIP, MULTIPART_MIXED]) == JSON {
         let text = app
             .submit(upload, scan.len(), move |mender, budget| {
                 let found = mender.optimize_anchor(scan, &search, budget)?;

@@ -15,7 +15,7 @@ use super::{
     accept::preferred,
     counted::{counted, take},
     error::RequestError,
-    media_types::{GLB, GLTF, MULTIPART_MIXED, ZIP},
+    media_types::{GLB, GLTF, MULTIPART_MIXED, OBJ, PLY, ZIP},
 };
 use darn_budget::MemoryPool;
 use darn_contract::{cut, port::ScanForm};
@@ -26,7 +26,7 @@ const ZIP_MAGIC: &[u8] = b"PK\x03\x04";
 /// In how many files a scan came.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ScanFiles {
-    /// In one: GLB, or glTF with data URIs.
+    /// In one: GLB, glTF with data URIs, OBJ or PLY.
     One,
     /// In a zip.
     Zip,
@@ -57,7 +57,7 @@ impl ScanFiles {
     /// glTF alone: its other files stay as they are.
     pub fn answer(self, headers: &HeaderMap) -> AnswerForm {
         let offered: &[&'static str] = match self {
-            Self::One => &[GLB, GLTF, MULTIPART_MIXED],
+            Self::One => &[GLB, GLTF, OBJ, PLY, MULTIPART_MIXED],
             Self::Zip => &[ZIP, GLB, GLTF, MULTIPART_MIXED],
             Self::Parts => &[GLTF, GLB, ZIP, MULTIPART_MIXED],
         };
@@ -71,12 +71,34 @@ impl ScanFiles {
     }
 }
 
-/// Whether bytes begin as a GLB, a zip, or a JSON object does.
+/// First words of the lines of an OBJ.
+const OBJ_WORDS: [&[u8]; 10] = [
+    b"v", b"vt", b"vn", b"f", b"o", b"g", b"s", b"mtllib", b"usemtl", b"l",
+];
+
+/// Whether bytes begin as a GLB, a zip, a JSON object, a PLY or an OBJ does; reading the scan looks closer.
 pub fn looks_like_a_scan(bytes: &[u8]) -> bool {
     let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     bytes.starts_with(b"glTF")
         || bytes.starts_with(ZIP_MAGIC)
         || text.trim_ascii_start().starts_with(b"{")
+        || bytes.starts_with(b"ply\n")
+        || bytes.starts_with(b"ply\r")
+        || begins_as_obj(text)
+}
+
+/// Whether the first line that is no comment begins with a word of an OBJ.
+fn begins_as_obj(text: &[u8]) -> bool {
+    const LOOKED_AT: usize = 4096;
+    let head = text.get(..LOOKED_AT).unwrap_or(text);
+    let lines = head.split(|byte| matches!(byte, b'\n' | b'\r'));
+    let mut said = lines
+        .map(<[u8]>::trim_ascii)
+        .filter(|line| !line.is_empty() && !line.starts_with(b"#"));
+    let word = said
+        .next()
+        .and_then(|line| line.split(u8::is_ascii_whitespace).next());
+    word.is_some_and(|word| OBJ_WORDS.contains(&word))
 }
 
 /// A zip of a scan and the files that it refers to, by their URIs, stored as they are. It goes no further than to the mender.
@@ -138,6 +160,29 @@ fn malformed(name: &str, error: &ZipError) -> RequestError {
 mod tests {
     use super::*;
     use axum::http::{HeaderValue, header};
+
+    #[test]
+    fn scans_are_told_by_how_they_begin() {
+        for scan in [
+            &b"glTF\x02"[..],
+            b"PK\x03\x04",
+            b"\xEF\xBB\xBF {}",
+            b"ply\nformat ascii 1.0",
+            b"# exported\r\n\r\n  mtllib a.mtl",
+            b"v 0 0 0",
+        ] {
+            assert!(looks_like_a_scan(scan), "{scan:?}");
+        }
+        for other in [
+            &b""[..],
+            b"<html>",
+            b"plywood",
+            b"# only a note",
+            b"very well",
+        ] {
+            assert!(!looks_like_a_scan(other), "{other:?}");
+        }
+    }
 
     #[test]
     fn answers_go_back_as_scans_came_unless_the_caller_prefers_otherwise() {

@@ -17,7 +17,7 @@ use super::{
     app::{App, UploadPermit},
     body::{self, ScanRequest},
     error::RequestError,
-    media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, OCTET_STREAM},
+    media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, OBJ, OCTET_STREAM, PLY},
     parameters::{self, Parameters},
     response::{self, MendResponse},
     session_store::SessionError,
@@ -136,7 +136,7 @@ async fn result(
     SessionId(id): SessionId,
     request: Request,
 ) -> Result<Response, RequestError> {
-    let media_type = preferred(request.headers(), &[GLB, GLTF, MULTIPART_MIXED]);
+    let media_type = preferred(request.headers(), &[GLB, GLTF, OBJ, PLY, MULTIPART_MIXED]);
     let upload = session_permit(&app, id, &request)?;
     let service = Arc::clone(&app);
     app.submit_to_session(id, upload, move |session, budget| {

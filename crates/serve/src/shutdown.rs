@@ -2,32 +2,76 @@
 
 use std::{io, time::Duration};
 
-use tokio::{
-    select,
-    signal::unix::{SignalKind, signal},
-    time::timeout,
-};
+use tokio::{select, time::timeout};
 use tokio_util::sync::CancellationToken;
 use tracing::{info, warn};
 
-/// Cancels `stop` at the first SIGTERM or SIGINT, and `abort`, which ends the drain, at the second.
+/// What asks a process to end: SIGTERM and SIGINT.
+#[cfg(unix)]
+struct EndSignals {
+    terminate: tokio::signal::unix::Signal,
+    interrupt: tokio::signal::unix::Signal,
+}
+
+#[cfg(unix)]
+impl EndSignals {
+    fn new() -> io::Result<Self> {
+        use tokio::signal::unix::{SignalKind, signal};
+        Ok(EndSignals {
+            terminate: signal(SignalKind::terminate())?,
+            interrupt: signal(SignalKind::interrupt())?,
+        })
+    }
+
+    /// Waits for the next; its name.
+    async fn next(&mut self) -> &'static str {
+        select! {
+            _ = self.terminate.recv() => "SIGTERM",
+            _ = self.interrupt.recv() => "SIGINT",
+        }
+    }
+}
+
+/// What asks a process to end: Ctrl-C, a console that is closed, a system that shuts down.
+#[cfg(windows)]
+struct EndSignals {
+    interrupt: tokio::signal::windows::CtrlC,
+    close: tokio::signal::windows::CtrlClose,
+    shutdown: tokio::signal::windows::CtrlShutdown,
+}
+
+#[cfg(windows)]
+impl EndSignals {
+    fn new() -> io::Result<Self> {
+        use tokio::signal::windows::{ctrl_c, ctrl_close, ctrl_shutdown};
+        Ok(EndSignals {
+            interrupt: ctrl_c()?,
+            close: ctrl_close()?,
+            shutdown: ctrl_shutdown()?,
+        })
+    }
+
+    /// Waits for the next; its name.
+    async fn next(&mut self) -> &'static str {
+        select! {
+            _ = self.interrupt.recv() => "Ctrl-C",
+            _ = self.close.recv() => "the console is closed",
+            _ = self.shutdown.recv() => "the system shuts down",
+        }
+    }
+}
+
+/// Cancels `stop` at the first signal that asks the process to end, and `abort`, which ends the drain, at the second.
 ///
 /// # Errors
 /// The signal handlers cannot be installed.
 pub fn on_signal(stop: CancellationToken, abort: CancellationToken) -> io::Result<()> {
-    let mut terminate = signal(SignalKind::terminate())?;
-    let mut interrupt = signal(SignalKind::interrupt())?;
+    let mut signals = EndSignals::new()?;
     tokio::spawn(async move {
-        let mut next = async || {
-            select! {
-                _ = terminate.recv() => "SIGTERM",
-                _ = interrupt.recv() => "SIGINT",
-            }
-        };
-        let signal = next().await;
+        let signal = signals.next().await;
         info!(signal, "shutting down");
         stop.cancel();
-        let signal = next().await;
+        let signal = signals.next().await;
         warn!(signal, "ending at once");
         abort.cancel();
     });
