@@ -182,6 +182,8 @@ impl MeshAsGltf {
 
 #[derive(Default)]
 struct GltfBuilder {
+    /// Per position the last group that has a corner there, and the number of the group's first.
+    first_at: Vec<(usize, u32)>,
     bin: Vec<u8>,
     views: Vec<Value>,
     accessors: Vec<Value>,
@@ -197,17 +199,28 @@ impl GltfBuilder {
         middle: [f64; 3],
         material: usize,
     ) -> Value {
-        let mut number_of: HashMap<Corner, u32> = HashMap::new();
+        // Most positions have one corner: the first of a group is found by its position alone.
+        self.first_at.resize(mesh.positions.len(), (usize::MAX, 0));
+        let mut others: HashMap<Corner, u32> = HashMap::new();
         let mut corners: Vec<Corner> = Vec::new();
         let mut indices = Vec::with_capacity(12 * group.faces.len());
         for corner in group.faces.iter().flatten() {
-            let number = *number_of.entry(*corner).or_insert_with(|| {
+            let next = corners.len() as u32;
+            let (of, first) = &mut self.first_at[corner.position as usize];
+            let number = if *of != material {
+                (*of, *first) = (material, next);
+                next
+            } else if corners[*first as usize] == *corner {
+                *first
+            } else {
+                *others.entry(*corner).or_insert(next)
+            };
+            if number == next {
                 corners.push(*corner);
-                corners.len() as u32 - 1
-            });
+            }
             indices.extend_from_slice(&number.to_le_bytes());
         }
-        drop(number_of);
+        drop(others);
         self.vertex_of.extend(corners.iter().map(|c| c.position));
         let count = corners.len();
         let place = |c: &Corner| {
