@@ -19,6 +19,7 @@ use darn_lab::garments;
 use darn_lab::scarffolds::samples::{SampleRotation, Sampler};
 use darn_lab::scarffolds::sheets::{self, SimulatedSheet};
 use darn_net::{Averaging, FillRequest};
+use darn_texture::testset::Family;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -33,6 +34,9 @@ pub struct EvaluateArgs {
     /// Complete the texture of ten fabrics in three layouts and three sizes of holes instead; with a folder, pictures go there
     #[arg(long, value_name = "DIR", num_args = 0..=1, conflicts_with_all = ["sheets", "garments", "noise", "picture", "upright", "scans", "masks", "once"])]
     texture: Option<Option<PathBuf>>,
+    /// Complete siblings of these fabrics, drawn by a seed: other numbers in their patterns, other colours, rims, islands and folds
+    #[arg(long, value_name = "SEED", requires = "texture")]
+    siblings: Option<u32>,
     /// Measure the mended garments of another filler instead: a folder with a GLB of the hole's name for each
     #[arg(long, value_name = "FOLDER", requires = "garments")]
     mended: Option<PathBuf>,
@@ -75,7 +79,8 @@ pub fn run(args: &EvaluateArgs) -> Result<(), Failure> {
         return garments(args, set.as_deref());
     }
     if let Some(pictures) = &args.texture {
-        return texture_table::run(pictures.as_deref(), args.json.as_deref());
+        let family = args.siblings.map_or(Family::Tuned, Family::Sibling);
+        return texture_table::run(family, pictures.as_deref(), args.json.as_deref());
     }
     let folder = args.sheets.clone().unwrap_or_default();
     let name = folder.display();

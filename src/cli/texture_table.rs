@@ -2,10 +2,13 @@
 
 use super::failure::{Failure, OrFail};
 use super::files;
-use darn_texture::testset::{FABRICS, HOLES, LAYOUTS, Scores, TestScan, Trial};
+use darn_texture::testset::{FABRICS, Family, LAYOUTS, Scores, TestScan, Trial};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::time::Instant;
+
+/// Differences of ΔE between fillers that do not count.
+const SAME_DELTA_E: f64 = 0.3;
 
 /// One hole of the test set.
 struct Row {
@@ -17,7 +20,7 @@ struct Row {
 }
 
 /// Prints the table; the pictures (truth, own texture, continued coordinates, averaged ones) go to a folder, the numbers to a file.
-pub fn run(pictures: Option<&Path>, json: Option<&Path>) -> Result<(), Failure> {
+pub fn run(family: Family, pictures: Option<&Path>, json: Option<&Path>) -> Result<(), Failure> {
     println!(
         "{:<12} {:<9} {:>4} | {:^34} | {:^27} | {:^12} | chosen",
         "fabric",
@@ -28,11 +31,11 @@ pub fn run(pictures: Option<&Path>, json: Option<&Path>) -> Result<(), Failure> 
         "average: ΔE"
     );
     let mut rows: Vec<Row> = Vec::new();
-    for hole in HOLES {
+    for hole in family.holes() {
         for layout in LAYOUTS {
             let first = rows.len();
             for fabric in FABRICS {
-                let scan = TestScan::new(fabric, layout, hole);
+                let scan = TestScan::of(family, fabric, layout, hole);
                 let started = Instant::now();
                 let trial = Trial::new(&scan).or_fail("complete a texture")?;
                 let row = Row {
@@ -52,7 +55,7 @@ pub fn run(pictures: Option<&Path>, json: Option<&Path>) -> Result<(), Failure> 
         }
     }
     for layout in LAYOUTS {
-        print_summary(layout.name(), &rows);
+        print_summary(family, layout.name(), &rows);
     }
     match json {
         Some(path) => {
@@ -89,6 +92,15 @@ fn print_row(row: &Row) {
 }
 
 /// What a mend without a choice takes.
+fn chosen_scores(row: &Row) -> &Scores {
+    let [own, continued, _] = &row.trial.scores;
+    match row.trial.continued.is_as_good() {
+        true => continued,
+        false => own,
+    }
+}
+
+/// The name of what a mend without a choice takes.
 fn chosen(row: &Row) -> &'static str {
     match row.trial.continued.is_as_good() {
         true => "continue",
@@ -97,8 +109,8 @@ fn chosen(row: &Row) -> &'static str {
 }
 
 /// Means over the fabrics of a layout, by size of hole, and what misses the targets.
-fn print_summary(layout: &str, rows: &[Row]) {
-    for hole in HOLES {
+fn print_summary(family: Family, layout: &str, rows: &[Row]) {
+    for hole in family.holes() {
         let of = || (rows.iter()).filter(|row| row.layout == layout && row.hole == hole);
         let count = of().count().max(1) as f64;
         let mean = |k: usize| of().map(|row| row.trial.scores[k].delta_e).sum::<f64>() / count;
@@ -106,16 +118,22 @@ fn print_summary(layout: &str, rows: &[Row]) {
         let phase = (of().map(|row| row.trial.scores[0].phase))
             .filter(|phase| phase.is_finite())
             .fold(0.0, f64::max);
+        let mean_chosen = of().map(|row| chosen_scores(row).delta_e).sum::<f64>() / count;
+        let worse = of().filter(|row| {
+            let [_, continued, average] = &row.trial.scores;
+            chosen_scores(row).delta_e > continued.delta_e.min(average.delta_e) + SAME_DELTA_E
+        });
         let missed = of().filter(|row| {
             let [own, continued, _] = &row.trial.scores;
             3.0 * own.delta_e > continued.delta_e
         });
         println!(
-            "{layout}, holes of {hole}: mean ΔE own {:.2}, continue {:.2}, average {:.2}; own above a third of continue {} of {count}; \
-             largest seam {seam:.2}, phase {phase:.3}",
+            "{layout}, holes of {hole}: mean ΔE own {:.2}, continue {:.2}, average {:.2}, chosen {mean_chosen:.2}; chosen worse than a peer {}; \
+             own above a third of continue {} of {count}; largest seam {seam:.2}, phase {phase:.3}",
             mean(0),
             mean(1),
             mean(2),
+            worse.count(),
             missed.count(),
         );
     }

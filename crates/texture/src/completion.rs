@@ -3,10 +3,9 @@
 use darn_budget::Budget;
 
 use crate::compose::{ComposedLayer, Cut, Field, compose};
-use crate::density;
 use crate::features::Feature;
 use crate::frame::{Frame, bounds};
-use crate::gather::Gathered;
+use crate::gather::{self, Gathered};
 use crate::input::{Cloth, LayerKind, PatchChart, Settings, TextureError};
 use crate::labels::choose;
 use crate::offsets::{Candidate, spread};
@@ -57,7 +56,7 @@ pub struct Completion<'a> {
     /// Few of them that together suit every place of the hole.
     candidates: Vec<Candidate>,
     /// Mean squared difference of unrelated places of the cloth.
-    unserved: f32,
+    pub(crate) unserved: f32,
     /// The light over the cloth, which the features are without.
     shading: Option<Shading>,
     bytes: usize,
@@ -74,7 +73,7 @@ pub fn estimated_bytes(
 ) -> Result<usize, TextureError> {
     cloth.check()?;
     patch.check()?;
-    let frame = density::frame(cloth, patch, settings)?;
+    let (frame, _) = gather::frame(cloth, patch, settings)?;
     let cut = cut(&frame, patch, settings);
     let layers = LAYER_BYTES * cloth.layers.len();
     Ok(SEARCH_BYTES + frame.len() * (TEXEL_BYTES + layers) + cut.len() * (BLEND_BYTES + layers))
@@ -176,6 +175,11 @@ impl<'a> Completion<'a> {
         let texel = |k: usize| cut.texel(k, self.gathered.frame.width);
         let of = |mask: &dyn Fn(usize) -> bool| (0..cut.len()).map(|k| mask(texel(k))).collect();
         [of(&|at| missing[at]), of(&|at| known[at] && !missing[at])]
+    }
+
+    /// Length of a texel in the chart.
+    pub fn step(&self) -> f64 {
+        self.gathered.frame.step
     }
 
     /// The chart's points at the middles of the texels of the patch's image.

@@ -320,3 +320,31 @@ impl Picture<'_> {
         equation
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::Settings;
+    use crate::labels::choose;
+    use crate::search::search;
+    use crate::testset::{Fabric, Family, Layout, TestScan};
+
+    #[test]
+    fn every_texel_on_both_sides_of_a_fold_has_a_source() {
+        let budget = Budget::unlimited();
+        for seed in 1..7 {
+            let scan = TestScan::of(Family::Sibling(seed), Fabric::Border, Layout::Mirrored, 71);
+            let cloth = scan.cloth();
+            let mut gathered =
+                Gathered::new(&cloth, &scan.patch, &Settings::default(), budget).unwrap();
+            let found = search(&mut gathered, budget).unwrap();
+            let raster = gathered.raster();
+            let labelling = choose(&raster, &found.candidates, found.unserved, budget).unwrap();
+            let field = Field::new(&gathered, &labelling, budget).unwrap();
+            let is_open = |at: &usize| gathered.missing[*at] && !gathered.known[*at];
+            let open = (0..raster.hole.len()).filter(is_open);
+            let without = open.filter(|at| field.source[*at] == NONE).count();
+            assert_eq!(without, 0, "{seed}");
+        }
+    }
+}

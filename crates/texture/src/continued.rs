@@ -32,20 +32,34 @@ pub struct ContinuedScore {
     pub hole: f64,
     /// The same of the cloth around the hole itself.
     pub cloth: f64,
-    /// Whether the patch's coordinates go on as one map with the cloth's, and show about as much there as around.
+    /// How unlike places of the cloth are that have nothing to do with each other.
+    pub unrelated: f64,
+    /// Whether the patch's coordinates go on as one map with the cloth's.
     pub is_one_map: bool,
+    /// Whether they are laid in folds, or stretched to several times their length.
+    pub is_folded: bool,
+    /// Whether the patch is about as bright and as varied as the cloth near it.
+    pub shows_as_much: bool,
 }
 
 /// The patch may be this many times as unlike as the cloth is to itself.
 const MOST_RATIO: f64 = 1.35;
 /// The same where the coordinates go on as one map: a border or a large print in the hole may be unlike all that is around it.
 const MOST_RATIO_OF_MAP: f64 = 2.6;
+/// A patch is related to the cloth up to this share of what unrelated places differ by, and may be unrelated from the second one on. (On one map that shows
+/// the rim drawn inwards, or another fabric, it is 0.44 to 3.)
+const RELATED: f64 = 0.4;
+const NOT_UNRELATED: f64 = 0.55;
+/// Cloth that differs from itself at its repeats by this share of what unrelated places differ by has none.
+const WITHOUT_REPEATS: f64 = 0.34;
 /// How far the map of a face of the patch may be from the cloth's mean map, as a share of that.
 const MOST_CHANGE: f64 = 0.35;
 /// How far the mean of the patch's features may be from the cloth's, and how much of the cloth's deviation it must have, in the cloth's standard
 /// deviations: an unused part of an image is plain.
 const MOST_SHIFT: f64 = 1.0;
 const LEAST_DEVIATION: f64 = 0.6;
+/// Twice the area of a face's map against the squares of its lengths: less than that of a stretch of one and a half, and it is drawn out.
+const LEAST_ROUND: f64 = 0.92;
 /// Share of the patch's area that must have the cloth's map.
 const LEAST_ALIKE: f64 = 0.97;
 /// Differences that nobody sees.
@@ -61,11 +75,21 @@ const PLACE_WORK: u64 = 120;
 impl ContinuedScore {
     /// Whether continuing is as good as a texture of the patch's own.
     pub fn is_as_good(&self) -> bool {
-        let most = match self.is_one_map {
-            true => MOST_RATIO_OF_MAP,
-            false => MOST_RATIO,
-        };
-        self.hole <= most * self.cloth + UNSEEN
+        let within = |ratio: f64| self.hole <= ratio * self.cloth + UNSEEN;
+        let is_related = self.hole <= RELATED * self.unrelated;
+        match (self.is_one_map, self.shows_as_much) {
+            (true, true) => {
+                let is_alike = self.hole <= NOT_UNRELATED * self.unrelated;
+                is_related || within(MOST_RATIO) || (within(MOST_RATIO_OF_MAP) && is_alike)
+            }
+            (true, false) => within(MOST_RATIO),
+            // Drawn-out cloth without repeats is as near to the truth as any other.
+            (false, true) if self.is_folded => {
+                within(MOST_RATIO) && self.cloth >= WITHOUT_REPEATS * self.unrelated
+            }
+            (false, true) => within(MOST_RATIO) && is_related,
+            (false, false) => false,
+        }
     }
 }
 
@@ -169,7 +193,10 @@ impl Completion<'_> {
         Ok(ContinuedScore {
             hole: mean(&holes),
             cloth: mean(&cloth),
-            is_one_map: self.is_one_map(continued) && self.shows_as_much(&look),
+            unrelated: f64::from(self.unserved).sqrt(),
+            is_one_map: self.is_one_map(continued),
+            is_folded: self.is_folded(continued),
+            shows_as_much: self.shows_as_much(&look),
         })
     }
 
@@ -190,6 +217,26 @@ impl Completion<'_> {
             .map(|k| (hole.0[k] - cloth.0[k]).powi(2))
             .sum::<f64>();
         shift.sqrt() <= MOST_SHIFT * cloth.1 && hole.1 >= LEAST_DEVIATION * cloth.1
+    }
+
+    /// Whether a part of a continued patch lies on another one in the image, or is drawn out along a line: as where both sides of a fold of the image meet
+    /// in the hole.
+    fn is_folded(&self, continued: &ContinuedPatch) -> bool {
+        let mut sets = self.cloth.materials.iter().flatten();
+        let Some(source) = sets.find(|source| source.image.is_some()) else {
+            return false;
+        };
+        let all: Vec<([f64; 4], f64)> = maps(&continued.placed(), source.texcoords).collect();
+        let det = |[ux, vx, uy, vy]: &[f64; 4]| ux * vy - vx * uy;
+        let turned: f64 = all.iter().map(|(map, area)| area * det(map).signum()).sum();
+        let area: f64 = all.iter().map(|(_, area)| area).sum();
+        let is_drawn = |map: &[f64; 4]| {
+            let squares: f64 = map.iter().map(|x| x * x).sum();
+            // At a ratio r of the two lengths it is 2 r / (1 + r²).
+            2.0 * det(map) * turned.signum() < LEAST_ROUND * squares
+        };
+        let drawn = all.iter().filter(|(map, _)| is_drawn(map));
+        drawn.map(|(_, area)| area).sum::<f64>() > (1.0 - LEAST_ALIKE) * area
     }
 
     /// Whether a continued patch has the map of the cloth around it: from the chart to the coordinates, in one piece.

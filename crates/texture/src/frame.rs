@@ -28,6 +28,19 @@ impl Frame {
         self.width * self.height
     }
 
+    /// The frame and some texels more on each side: left, above, right, below.
+    pub(crate) fn widened(&self, [left, above, right, below]: [usize; 4]) -> Frame {
+        Frame {
+            origin: [
+                self.origin[0] - left as f64 * self.step,
+                self.origin[1] + above as f64 * self.step,
+            ],
+            step: self.step,
+            width: left + self.width + right,
+            height: above + self.height + below,
+        }
+    }
+
     /// The chart's point at the middle of a texel.
     pub(crate) fn centre(&self, column: usize, row: usize) -> [f64; 2] {
         [
@@ -42,6 +55,13 @@ impl Frame {
             (p[0] - self.origin[0]) / self.step,
             (self.origin[1] - p[1]) / self.step,
         ]
+    }
+
+    /// The texel that holds a point of the chart.
+    pub(crate) fn texel(&self, p: [f64; 2]) -> Option<usize> {
+        let [x, y] = self.texels(p).map(f64::floor);
+        let inside = x >= 0.0 && y >= 0.0 && x < self.width as f64 && y < self.height as f64;
+        inside.then(|| y as usize * self.width + x as usize)
     }
 }
 

@@ -6,7 +6,7 @@ use crate::density;
 use crate::features::{Feature, distance, features};
 use crate::frame::{Frame, NONE, bounds, owners};
 use crate::input::{Cloth, PatchChart, Settings, TextureError};
-use crate::mirror::{Reflection, reflection};
+use crate::mirror::{Reflection, reflection, widened};
 use crate::offsets::Known;
 use crate::resample::{OwnedRaster, Placed, resample};
 use crate::seams::leave_cuts;
@@ -16,6 +16,19 @@ const TEXEL_WORK: u64 = 40;
 
 /// How much the cloth may differ from its mirror image, against unrelated places.
 const ALIKE: f32 = 0.3;
+
+/// The raster around a patch, and the reflection by which the cloth shows its images twice.
+pub(crate) fn frame(
+    cloth: &Cloth,
+    patch: &PatchChart,
+    settings: &Settings,
+) -> Result<(Frame, Option<Reflection>), TextureError> {
+    let frame = density::frame(cloth, patch, settings)?;
+    let size = frame.step * frame.width.max(frame.height) as f64;
+    let reflection = reflection(cloth, size);
+    let frame = reflection.map_or(frame, |r| widened(&frame, &r, settings.max_side as usize));
+    Ok((frame, reflection))
+}
 
 /// The cloth in the raster. When the cloth shows its images twice, mirrored, there is a second page after the first: its mirror image.
 pub(crate) struct Gathered {
@@ -43,7 +56,7 @@ impl Gathered {
         settings: &Settings,
         budget: &Budget,
     ) -> Result<Gathered, TextureError> {
-        let frame = density::frame(cloth, patch, settings)?;
+        let (frame, reflection) = frame(cloth, patch, settings)?;
         budget.spend(TEXEL_WORK * frame.len() as u64)?;
         let owner = owners(&frame, &cloth.flat, &cloth.faces, budget)?;
         let of_patch = owners(&frame, &patch.flat, &patch.faces, budget)?;
@@ -66,8 +79,7 @@ impl Gathered {
             return Err(TextureError::Nothing("cloth in the raster"));
         }
         gathered.near = near(&frame, patch, &gathered.known);
-        let size = frame.step * frame.width.max(frame.height) as f64;
-        if let Some(reflection) = reflection(cloth, size) {
+        if let Some(reflection) = reflection {
             let flat: Vec<[f64; 2]> = cloth.flat.iter().map(|p| reflection.of(*p)).collect();
             let owner = owners(&frame, &flat, &cloth.faces, budget)?;
             gathered.add_page(cloth, &flat, &owner, budget)?;
@@ -113,12 +125,16 @@ impl Gathered {
                 .iter_mut()
                 .for_each(|layer| layer[to] = layer[from]);
         }
-        for k in 0..page {
+        let open = |k: usize| self.missing[k] && !self.known[k];
+        let hole = |k: usize| {
             let p = self
                 .frame
                 .centre(k % self.frame.width, k / self.frame.width);
-            self.hole[k] = self.missing[k] && !self.known[k] && reflection.side(p) >= 0.0;
-        }
+            // Texels of the other side whose mirror image is not filled are filled themselves.
+            let is_copied = || self.frame.texel(reflection.of(p)).is_some_and(open);
+            open(k) && (reflection.side(p) >= 0.0 || !is_copied())
+        };
+        self.hole = (0..page).map(hole).collect();
         self.mirror = Some(reflection);
     }
 
@@ -129,10 +145,15 @@ impl Gathered {
         };
         let (frame, page) = (&self.frame, self.frame.len());
         let centre = |at: usize| frame.centre(at % frame.width, at / frame.width);
-        let texel = |p: [f64; 2]| {
-            let [x, y] = frame.texels(p).map(f64::floor);
-            let inside = x >= 0.0 && y >= 0.0 && x < frame.width as f64 && y < frame.height as f64;
-            inside.then(|| y as usize * frame.width + x as usize)
+        let texel = |p: [f64; 2]| frame.texel(p);
+        let around = |at: usize| {
+            [
+                at,
+                at + 1,
+                at.wrapping_sub(1),
+                at + frame.width,
+                at.wrapping_sub(frame.width),
+            ]
         };
         let found: Vec<(usize, u32)> = (0..page)
             .filter(|k| self.missing[*k] && !self.known[*k] && !self.hole[*k])
@@ -140,21 +161,16 @@ impl Gathered {
                 let p = centre(k);
                 let q = texel(reflection.of(p))?;
                 // Beside the line the mirror image may be a texel of this side.
-                let near = [
-                    q,
-                    q + 1,
-                    q.wrapping_sub(1),
-                    q + frame.width,
-                    q.wrapping_sub(frame.width),
-                ];
-                let q = near
-                    .into_iter()
-                    .find(|q| source.get(*q).is_some_and(|s| *s != NONE))?;
+                let q =
+                    (around(q).into_iter()).find(|q| source.get(*q).is_some_and(|s| *s != NONE))?;
                 let s = source[q] as usize;
                 // The movement, mirrored, so that a copy stays in one piece.
                 let (from, to) = (reflection.of(centre(q)), reflection.of(centre(s)));
-                let moved = texel([p[0] + to[0] - from[0], p[1] + to[1] - from[1]])?;
-                self.known[page + moved].then_some((k, (page + moved) as u32))
+                let moved = texel([p[0] + to[0] - from[0], p[1] + to[1] - from[1]]);
+                let shown = |at: &usize| *at < page && self.known[page + *at];
+                let mirrored = moved.and_then(|moved| around(moved).into_iter().find(shown));
+                // Beyond the raster: the texel itself, unmirrored.
+                Some((k, mirrored.map_or(s, |at| page + at) as u32))
             })
             .collect();
         found.into_iter().for_each(|(k, s)| source[k] = s);

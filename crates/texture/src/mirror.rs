@@ -3,7 +3,7 @@
 //! Left and right of many garments lie mirrored on each other in their image. What is missing on one side of the line may be there on the other, so the
 //! cloth's mirror image is a second page to copy from.
 
-use crate::frame::doubled_area;
+use crate::frame::{Frame, doubled_area};
 use crate::input::Cloth;
 
 /// Faces that are looked at.
@@ -36,6 +36,36 @@ impl Reflection {
         let (sin, cos) = (0.5 * self.angle).sin_cos();
         0.5 * (cos * (p[1] - other[1]) - sin * (p[0] - other[0]))
     }
+}
+
+/// Texels that a side of a frame may gain, as a share of it.
+const MOST_GAIN: f64 = 0.5;
+
+/// The frame, wide enough for its own mirror image where `max_side` and [`MOST_GAIN`] allow it: what a texel on one side of the line copies, the mirror image of
+/// that texel must find mirrored.
+pub(crate) fn widened(frame: &Frame, reflection: &Reflection, max_side: usize) -> Frame {
+    let corners = [
+        [0, 0],
+        [frame.width, 0],
+        [0, frame.height],
+        [frame.width, frame.height],
+    ];
+    let corners = corners.map(|[column, row]| {
+        let p = [
+            frame.origin[0] + column as f64 * frame.step,
+            frame.origin[1] - row as f64 * frame.step,
+        ];
+        frame.texels(reflection.of(p))
+    });
+    let gains = [0, 1].map(|k: usize| {
+        let size = [frame.width, frame.height][k];
+        let most = ((MOST_GAIN * size as f64) as usize).min(max_side.saturating_sub(size));
+        let low = corners.iter().map(|c| c[k]).fold(0.0, f64::min);
+        let high = corners.iter().map(|c| c[k]).fold(size as f64, f64::max);
+        let before = ((-low).ceil() as usize).min(most);
+        [before, ((high.ceil() as usize) - size).min(most - before)]
+    });
+    frame.widened([gains[0][0], gains[1][0], gains[0][1], gains[1][1]])
 }
 
 /// A face with its places in the first image of its material.

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use darn_budget::{Budget, Exhausted, Limits};
-use darn_texture::testset::{FABRICS, Fabric, LAYOUTS, Layout, TestScan, Trial};
+use darn_texture::testset::{FABRICS, Fabric, Family, LAYOUTS, Layout, TestScan, Trial};
 use darn_texture::{
     Cloth, Completion, LayerKind, PatchChart, PatchTexture, Settings, Source, SourceImage,
     TextureError, Wrap,
@@ -226,6 +226,69 @@ fn continuing_is_as_good_where_the_image_goes_on_and_not_on_atlases_and_folds() 
             assert!(whole.is_as_good(), "{}: {whole:?}", fabric.name());
             let folded = judged(Layout::Mirrored);
             assert!(!folded.is_as_good(), "{}: {folded:?}", fabric.name());
+        }
+    }
+}
+
+/// A sheet on one map that shows the rim drawn inwards in the hole, as a baker's padding does, or another fabric.
+fn unlike_in_the_hole(fabric: Fabric, filling: Option<Fabric>) -> TestScan {
+    let mut scan = TestScan::new(fabric, Layout::OneMap, 128);
+    let other = filling.map(|fabric| TestScan::new(fabric, Layout::OneMap, 128));
+    let side = scan.side;
+    let middle = side as f64 / 2.0;
+    let from_middle = |x: usize, y: usize| [x as f64 + 0.5 - middle, y as f64 + 0.5 - middle];
+    let before = scan.texels.clone();
+    for at in 0..before.len() {
+        let [dx, dy] = from_middle(at % side, at / side);
+        let radius = dx.hypot(dy);
+        // Beyond the widest part of the rim.
+        let outside = 69.0;
+        if radius >= outside {
+            continue;
+        }
+        let at_rim = |d: f64| (middle + d / radius.max(0.5) * outside) as usize;
+        scan.texels[at] = match &other {
+            Some(other) => other.texels[at],
+            None => before[at_rim(dy) * side + at_rim(dx)],
+        };
+    }
+    scan
+}
+
+#[test]
+fn continuing_is_not_as_good_where_one_map_shows_something_else_in_the_hole() {
+    for (fabric, other) in FABRICS.into_iter().zip(FABRICS.into_iter().cycle().skip(3)) {
+        for filling in [None, Some(other)] {
+            // A photograph drawn inwards is as near to the truth as any other part of it.
+            if fabric == Fabric::Photograph && filling.is_none() {
+                continue;
+            }
+            let trial = Trial::new(&unlike_in_the_hole(fabric, filling)).unwrap();
+            let score = trial.continued;
+            assert!(!score.is_as_good(), "{}: {score:?}", fabric.name());
+        }
+    }
+}
+
+#[test]
+fn what_is_chosen_for_siblings_is_no_worse_than_the_other() {
+    for fabric in FABRICS {
+        for layout in LAYOUTS {
+            let scan = TestScan::of(Family::Sibling(1), fabric, layout, 71);
+            let trial = Trial::new(&scan).unwrap();
+            let [own, continued, _] = trial.scores.map(|scores| scores.delta_e);
+            let (chosen, other) = match trial.continued.is_as_good() {
+                true => (continued, own),
+                false => (own, continued),
+            };
+            // The print is larger than what is left of it around the hole.
+            let allowed = if fabric == Fabric::LargePrint {
+                3.0
+            } else {
+                0.5
+            };
+            let name = format!("{} {}", fabric.name(), layout.name());
+            assert!(chosen < other + allowed, "{name}: {chosen} {other}");
         }
     }
 }

@@ -1,5 +1,7 @@
 //! How near a picture of a hole comes to the truth.
 
+use super::fabric::Swatch;
+
 /// A picture of the patch beside the truth.
 pub struct Comparison<'a> {
     /// Columns of the pictures.
@@ -30,8 +32,8 @@ pub struct Scores {
 }
 
 impl Comparison<'_> {
-    /// All numbers. `periods` as [`super::Fabric::periods`].
-    pub fn scores(&self, periods: [f32; 2]) -> Scores {
+    /// All numbers.
+    pub fn scores(&self, phases: &Phases) -> Scores {
         let lab = |t: &[u8; 4]| lab([t[0], t[1], t[2]]);
         let (made, truth): (Vec<[f64; 3]>, Vec<[f64; 3]>) = (
             self.made.iter().map(lab).collect(),
@@ -54,7 +56,7 @@ impl Comparison<'_> {
                 .sum::<f64>()
                 / count,
             seam: self.seam(&made) / self.seam(&truth).max(1e-9),
-            phase: self.phase(&made, &truth, periods),
+            phase: self.phase(&made, &truth, phases),
         }
     }
 
@@ -102,16 +104,15 @@ impl Comparison<'_> {
     }
 
     /// The displacement, within half a period, at which what was made fits the truth best along the seam.
-    fn phase(&self, made: &[f64], truth: &[f64], periods: [f32; 2]) -> f64 {
-        if periods == [0.0; 2] {
+    fn phase(&self, made: &[f64], truth: &[f64], phases: &Phases) -> f64 {
+        if phases.periods == [0.0; 2] {
             return f64::NAN;
         }
-        let reach = periods.map(|p| (0.5 * p).floor() as i64);
         let near: Vec<usize> = (0..self.hole.len())
             .filter(|at| self.hole[*at] && self.window(*at, 10).any(|k| self.known[k]))
             .collect();
         let (width, height) = (self.width as i64, (self.hole.len() / self.width) as i64);
-        let cost = |dx: i64, dy: i64| {
+        let cost = |[dx, dy]: [i64; 2]| {
             let (mut sum, mut count) = (0.0, 0.0f64);
             for at in &near {
                 let (x, y) = (
@@ -126,16 +127,15 @@ impl Comparison<'_> {
             sum / count.max(1.0)
         };
         let mut best = (f64::INFINITY, [0i64; 2]);
-        for dy in -reach[1]..=reach[1] {
-            for dx in -reach[0]..=reach[0] {
-                let own = cost(dx, dy);
-                if own < best.0 {
-                    best = (own, [dx, dy]);
-                }
+        for by in phases.movements() {
+            let own = cost(by);
+            if own < best.0 {
+                best = (own, by);
             }
         }
         let [dx, dy] = best.1;
-        let fraction = |before: f64, after: f64| {
+        let fraction = |before: [i64; 2], after: [i64; 2]| {
+            let (before, after) = (cost(before), cost(after));
             let bend = before + after - 2.0 * best.0;
             if bend > 1e-9 {
                 (0.5 * (before - after) / bend).clamp(-0.5, 0.5)
@@ -143,16 +143,74 @@ impl Comparison<'_> {
                 0.0
             }
         };
-        let along = |k: usize, d: i64, part: f64| {
-            if periods[k] > 0.0 {
-                (d as f64 + part) / f64::from(periods[k])
-            } else {
-                0.0
-            }
+        let x = dx as f64 + fraction([dx - 1, dy], [dx + 1, dy]);
+        let y = dy as f64 + fraction([dx, dy - 1], [dx, dy + 1]);
+        let [along, across] = phases.of([x, y]);
+        along.hypot(across)
+    }
+}
+
+/// Movements over a picture in periods of its pattern.
+pub struct Phases {
+    swatch: Swatch,
+    /// Length of a texel on the cloth.
+    step: f32,
+    periods: [f32; 2],
+}
+
+impl Phases {
+    /// For pictures with texels of a length.
+    pub fn new(swatch: &Swatch, step: f64) -> Phases {
+        Phases {
+            swatch: *swatch,
+            step: step as f32,
+            periods: swatch.fabric.periods(),
+        }
+    }
+
+    fn pattern(&self, [x, y]: [f64; 2]) -> [f32; 2] {
+        // Rows go down.
+        self.swatch
+            .movement([x as f32 * self.step, -(y as f32) * self.step])
+    }
+
+    /// A movement in texels in periods along each axis of the pattern; zero along an axis without.
+    fn of(&self, movement: [f64; 2]) -> [f64; 2] {
+        let along = self.pattern(movement);
+        [0, 1].map(|k: usize| match self.periods[k] {
+            0.0 => 0.0,
+            period => f64::from(along[k] / period),
+        })
+    }
+
+    /// Whether no repeat of the pattern is nearer to a movement, given in periods, than standing still.
+    fn is_least(&self, [x, y]: [f64; 2]) -> bool {
+        let mut repeats = self.swatch.fabric.repeats_within().iter();
+        repeats.all(|r| {
+            let r = r.map(f64::from);
+            2.0 * (x * r[0] + y * r[1]).abs() <= 1.001 * (r[0] * r[0] + r[1] * r[1])
+        })
+    }
+
+    /// All movements of whole texels within half a period; along an axis without a period, within half a texel.
+    fn movements(&self) -> impl Iterator<Item = [i64; 2]> + '_ {
+        let longest = self.periods[0].max(self.periods[1]);
+        let texel = self.pattern([1.0, 0.0]);
+        let texel = texel[0].hypot(texel[1]);
+        let reach = (0.75 * longest / texel).ceil() as i64;
+        let within = move |by: &[i64; 2]| {
+            let along = self.pattern(by.map(|x| x as f64));
+            (0..2).all(|k| {
+                let most = match self.periods[k] {
+                    0.0 => 0.51 * texel,
+                    period => 0.5 * period,
+                };
+                along[k].abs() <= most
+            }) && self.is_least(self.of(by.map(|x| x as f64)))
         };
-        let x = along(0, dx, fraction(cost(dx - 1, dy), cost(dx + 1, dy)));
-        let y = along(1, dy, fraction(cost(dx, dy - 1), cost(dx, dy + 1)));
-        x.hypot(y)
+        (-reach..=reach)
+            .flat_map(move |y| (-reach..=reach).map(move |x| [x, y]))
+            .filter(within)
     }
 }
 

@@ -1,12 +1,15 @@
-//! A test set with known answers: ten fabrics, three layouts, three sizes of holes, and what other fillers make of them.
+//! Test sets with known answers: ten fabrics, three layouts, three sizes of holes, and what other fillers make of them. Beside the set on which the
+//! completion's constants were chosen there are siblings of it, as many as there are seeds.
 
+mod draw;
 mod fabric;
 mod metrics;
 mod peers;
 mod scan;
 
-pub use fabric::{FABRICS, Fabric};
-pub use metrics::{Comparison, Scores, ciede2000, lab};
+pub use draw::Family;
+pub use fabric::{FABRICS, Fabric, Swatch};
+pub use metrics::{Comparison, Phases, Scores, ciede2000, lab};
 pub use peers::{Peer, continued};
 pub use scan::{HOLES, LAYOUTS, Layout, TestScan};
 
@@ -51,6 +54,7 @@ impl Trial {
         let made = [texture, image(0)?, image(1)?];
         let [hole, known] = completion.masks();
         let width = width as usize;
+        let phases = Phases::new(&scan.swatch, completion.step());
         let scores = made.each_ref().map(|made| {
             let comparison = Comparison {
                 width,
@@ -59,7 +63,7 @@ impl Trial {
                 hole: &hole,
                 known: &known,
             };
-            comparison.scores(scan.fabric.periods())
+            comparison.scores(&phases)
         });
         let continued = completion.score_continued(&peers[0], budget)?;
         Ok(Trial {
