@@ -17,6 +17,39 @@ use darn_budget::Budget;
 
 use crate::{Completion, ContinuedScore, PatchTexture, Settings, TextureError};
 
+/// The cloth around a hole laid flat, as a completion sees it: for fillers of pictures.
+pub struct ClothRaster {
+    /// Columns.
+    pub width: usize,
+    /// The first layer.
+    pub texels: Vec<[u8; 4]>,
+    /// Which texels show cloth.
+    pub known: Vec<bool>,
+    /// Which texels are to be filled.
+    pub hole: Vec<bool>,
+    /// Per texel of the patch's image: its texel of the raster.
+    pub of_image: Vec<usize>,
+}
+
+impl ClothRaster {
+    /// What a completion has read. Texels of a mirrored cloth that its other side shows are known.
+    pub fn new(completion: &Completion) -> ClothRaster {
+        let gathered = &completion.gathered;
+        let page = gathered.frame.len();
+        let cut = completion.cut();
+        let known = gathered.known[..page].to_vec();
+        ClothRaster {
+            width: gathered.frame.width,
+            texels: gathered.layers[0][..page].to_vec(),
+            hole: (0..page).map(|k| gathered.missing[k] && !known[k]).collect(),
+            known,
+            of_image: (0..cut.len())
+                .map(|k| cut.texel(k, gathered.frame.width))
+                .collect(),
+        }
+    }
+}
+
 /// What fillers make of one hole.
 pub struct Trial {
     /// Columns of all pictures.
