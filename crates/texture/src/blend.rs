@@ -52,28 +52,26 @@ impl Equation {
     }
 
     /// The sum of the weights at a texel, and the sum of weight × neighbour.
+    ///
+    /// No weight leads out of a row, so the neighbours of a row's ends that lie in other rows count nothing.
     #[inline]
     fn around(&self, at: usize, x: &[Value]) -> (f32, Value) {
-        let (column, width) = (at % self.width, self.width);
+        let width = self.width;
         let mut sum = [0.0f32; 4];
         let mut total = self.fixed[at];
-        let mut add = |weight: f32, other: usize| {
-            if weight > 0.0 {
+        let mut add = |weight: f32, other: Option<&Value>| {
+            if let Some(other) = other {
                 total += weight;
-                (0..4).for_each(|k| sum[k] += weight * x[other][k]);
+                (0..4).for_each(|k| sum[k] += weight * other[k]);
             }
         };
-        if column + 1 < width {
-            add(self.right[at], at + 1);
+        add(self.right[at], x.get(at + 1));
+        if at > 0 {
+            add(self.right[at - 1], x.get(at - 1));
         }
-        if column > 0 {
-            add(self.right[at - 1], at - 1);
-        }
-        if at + width < self.free.len() {
-            add(self.below[at], at + width);
-        }
+        add(self.below[at], x.get(at + width));
         if at >= width {
-            add(self.below[at - width], at - width);
+            add(self.below[at - width], x.get(at - width));
         }
         (total, sum)
     }
@@ -121,27 +119,31 @@ impl Equation {
     fn coarser(&self) -> Equation {
         let (width, height) = (self.width.div_ceil(2), self.height().div_ceil(2));
         let mut coarse = Equation::new(width, height);
-        for at in 0..self.free.len() {
-            let (column, row) = (at % self.width, at / self.width);
-            let cell = row / 2 * width + column / 2;
-            coarse.free[cell] |= self.free[at];
-            // Half of the sum: the middles of cells are twice as far apart as those of texels. Neighbours that are held do not move away.
-            if column % 2 == 1 {
-                coarse.right[cell] += 0.5 * self.right[at];
+        for row in 0..self.height() {
+            for column in 0..self.width {
+                let at = row * self.width + column;
+                let cell = row / 2 * width + column / 2;
+                coarse.free[cell] |= self.free[at];
+                // Half of the sum: the middles of cells are twice as far apart as those of texels. Neighbours that are held do not move away.
+                if column % 2 == 1 {
+                    coarse.right[cell] += 0.5 * self.right[at];
+                }
+                if row % 2 == 1 {
+                    coarse.below[cell] += 0.5 * self.below[at];
+                }
+                coarse.fixed[cell] += self.fixed[at];
             }
-            if row % 2 == 1 {
-                coarse.below[cell] += 0.5 * self.below[at];
-            }
-            coarse.fixed[cell] += self.fixed[at];
         }
         coarse
     }
 
     fn restrict(&self, fine: &[Value], coarse: &Equation) -> Vec<Value> {
         let mut sums = vec![[0.0; 4]; coarse.free.len()];
-        for (at, value) in fine.iter().enumerate() {
-            let cell = at / self.width / 2 * coarse.width + at % self.width / 2;
-            (0..4).for_each(|k| sums[cell][k] += value[k]);
+        for (row, values) in fine.chunks(self.width).enumerate() {
+            let cells = &mut sums[row / 2 * coarse.width..];
+            for (column, value) in values.iter().enumerate() {
+                (0..4).for_each(|k| cells[column / 2][k] += value[k]);
+            }
         }
         sums
     }

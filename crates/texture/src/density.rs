@@ -5,8 +5,10 @@ use crate::input::{Cloth, LayerKind, PatchChart, Settings, TextureError};
 
 /// Cloth around the patch in the raster, as a share of the patch's longer side.
 const AROUND: f64 = 0.75;
-/// The same when the raster would be too large: less cloth to copy from, but more texels for the patch.
+/// The same at least when the raster would be too large: less cloth to copy from, but more texels for the patch.
 const AROUND_LEAST: f64 = 0.4;
+/// Texels around the patch that are enough, where [`AROUND_LEAST`] does not ask for more: beside a large hole there are repeats without going far.
+const AROUND_ENOUGH: f64 = 192.0;
 /// Texels of a side of the raster that a setting cannot forbid.
 const LEAST_SIDE: u32 = 64;
 /// Texels of cloth around the patch at least.
@@ -73,7 +75,8 @@ pub(crate) fn frame(
         [[from(0), from(1)], [to(0), to(1)]]
     };
     let longest = |w: [[f64; 2]; 2]| (w[1][0] - w[0][0]).max(w[1][1] - w[0][1]);
-    let wanted = (AROUND * side).max(AROUND_TEXELS / density);
+    let enough = (AROUND_ENOUGH / density).max(AROUND_LEAST * side);
+    let wanted = (AROUND * side).min(enough).max(AROUND_TEXELS / density);
     let mut reach = wanted;
     if longest(window(reach, density)) * density > most {
         reach = (0.5 * (most / density - side)).clamp(AROUND_LEAST * side, wanted);

@@ -25,6 +25,9 @@ const UNIT: f32 = 4096.0;
 const SITE_WORK: u64 = 400;
 const PLACE_WORK: u64 = 12;
 
+/// Two open neighbours: a site, which of its borders, and the site beyond.
+type Pair = (usize, usize, usize);
+
 /// Sites of the places, row by row, and what each label shows at each place.
 pub(crate) struct Sites {
     columns: usize,
@@ -151,7 +154,7 @@ impl Sites {
     }
 
     /// Pairs of open neighbours: site, which border, neighbour.
-    fn pairs(&self) -> Vec<(usize, usize, usize)> {
+    fn pairs(&self) -> Vec<Pair> {
         let mut pairs = Vec::new();
         for site in 0..self.open.len() {
             let right = (site + 1) % self.columns != 0;
@@ -165,7 +168,7 @@ impl Sites {
         pairs
     }
 
-    fn energy(&self, labels: &[u8], pairs: &[(usize, usize, usize)]) -> f64 {
+    fn energy(&self, labels: &[u8], pairs: &[Pair]) -> f64 {
         let own = |site: usize| {
             if self.open[site] {
                 self.own[site][labels[site] as usize]
@@ -174,7 +177,7 @@ impl Sites {
             }
         };
         let sites: f64 = (0..labels.len()).map(|s| f64::from(own(s))).sum();
-        let seam = |(site, down, other): &(usize, usize, usize)| {
+        let seam = |(site, down, other): &Pair| {
             f64::from(self.seam((*site, *down), labels[*site], labels[*other]))
         };
         sites + pairs.iter().map(seam).sum::<f64>()
@@ -192,14 +195,19 @@ impl Sites {
         };
         let mut labels: Vec<u8> = (0..self.open.len()).map(cheapest).collect();
         let mut energy = self.energy(&labels, &pairs);
+        let mut seams = self.seams(&labels, &pairs);
         for _ in 0..SWEEPS {
             let before = energy;
             for label in 0..count as u8 {
                 budget.spend(SITE_WORK * self.open.len() as u64)?;
-                let next = self.expanded(&labels, label, &pairs);
+                let next = self.expanded(&labels, label, &pairs, &seams);
+                if next == labels {
+                    continue;
+                }
                 let lower = self.energy(&next, &pairs);
                 if lower < energy {
                     (labels, energy) = (next, lower);
+                    seams = self.seams(&labels, &pairs);
                 }
             }
             if energy >= before {
@@ -209,8 +217,15 @@ impl Sites {
         Ok(self.of_place.iter().map(|site| labels[*site]).collect())
     }
 
+    /// What the seam of each pair costs.
+    fn seams(&self, labels: &[u8], pairs: &[Pair]) -> Vec<f32> {
+        let seam =
+            |(site, down, other): &Pair| self.seam((*site, *down), labels[*site], labels[*other]);
+        pairs.iter().map(seam).collect()
+    }
+
     /// The best labelling in which any site keeps its label or takes this one.
-    fn expanded(&self, labels: &[u8], label: u8, pairs: &[(usize, usize, usize)]) -> Vec<u8> {
+    fn expanded(&self, labels: &[u8], label: u8, pairs: &[Pair], seams: &[f32]) -> Vec<u8> {
         let whole = |x: f32| (UNIT * x) as i64;
         let mut leans: Vec<i64> = (0..labels.len())
             .map(|site| {
@@ -223,10 +238,10 @@ impl Sites {
             })
             .collect();
         let mut graph = Graph::new(labels.len());
-        for (site, down, other) in pairs {
+        for ((site, down, other), stay) in pairs.iter().zip(seams) {
             let seam = |a: u8, b: u8| whole(self.seam((*site, *down), a, b));
             let (a, b) = (labels[*site], labels[*other]);
-            let (stay, second, first) = (seam(a, b), seam(a, label), seam(label, b));
+            let (stay, second, first) = (whole(*stay), seam(a, label), seam(label, b));
             leans[*site] += first - stay;
             leans[*other] -= first;
             let capacity = (second + first - stay).max(0);

@@ -18,15 +18,24 @@ pub(crate) fn features(
     layers: &[Vec<[u8; 4]>],
     known: &[bool],
 ) -> Vec<Feature> {
+    let feature = feature(kinds, layers);
+    (0..known.len())
+        .into_par_iter()
+        .map(|at| if known[at] { feature(at) } else { [0.0; 4] })
+        .collect()
+}
+
+/// The feature of a known texel.
+pub(crate) fn feature(
+    kinds: &[LayerKind],
+    layers: &[Vec<[u8; 4]>],
+) -> impl Fn(usize) -> Feature + Sync {
     let base = (kinds.iter().position(|k| *k == LayerKind::BaseColour))
         .or_else(|| kinds.iter().position(|k| *k == LayerKind::Colour));
     let others: Vec<usize> = (0..kinds.len()).filter(|k| Some(*k) != base).collect();
     let share = OTHER_WEIGHT / (others.len().max(1) as f32).sqrt();
     let unit = |x: u8| f32::from(x) / 255.0;
-    let feature = |at: usize| {
-        if !known[at] {
-            return [0.0; 4];
-        }
+    move |at: usize| {
         let mut feature = [0.0; 4];
         if let Some(base) = base {
             let [r, g, b, a] = layers[base][at].map(unit);
@@ -41,8 +50,7 @@ pub(crate) fn features(
             feature[3] += share * (r + 0.7 * g + 0.4 * b);
         }
         feature
-    };
-    (0..known.len()).into_par_iter().map(feature).collect()
+    }
 }
 
 /// Squared distance of two features.

@@ -3,17 +3,19 @@
 use darn_budget::Budget;
 
 use crate::density;
-use crate::features::{Feature, distance, features};
+use crate::features::{Feature, distance, feature, features};
 use crate::frame::{Frame, NONE, bounds, owners};
 use crate::input::{Cloth, PatchChart, Settings, TextureError};
 use crate::mirror::{Reflection, reflection, widened};
-use crate::offsets::Known;
+use crate::offsets::{Known, spread};
 use crate::resample::{OwnedRaster, Placed, resample};
 use crate::seams::leave_cuts;
 
 /// Nanoseconds of work for a texel of the raster.
 const TEXEL_WORK: u64 = 40;
 
+/// Texels at which a mirror image is compared with the cloth, about.
+const COMPARED: usize = 20_000;
 /// How much the cloth may differ from its mirror image, against unrelated places.
 const ALIKE: f32 = 0.3;
 
@@ -96,17 +98,19 @@ impl Gathered {
     /// What one page shows and the other does not goes to the other too, when they are alike.
     fn mirror(&mut self, cloth: &Cloth, reflection: Reflection) {
         let page = self.frame.len();
-        let looks = features(&cloth.layers, &self.layers, &self.known);
-        let both: Vec<usize> = (0..page)
-            .filter(|k| self.near[*k] && self.known[page + k])
+        let look = feature(&cloth.layers, &self.layers);
+        let both: Vec<bool> = (0..page)
+            .map(|k| self.near[k] && self.known[page + k])
             .collect();
+        let both = spread(&both, COMPARED);
         let mean = |of: &dyn Fn(usize) -> f32| {
             both.iter().map(|k| of(*k)).sum::<f32>() / both.len().max(1) as f32
         };
-        let differs = mean(&|k| distance(looks[k], looks[page + k]));
+        let differs = mean(&|k| distance(look(k), look(page + k)));
         let (one, two) = (both.len() / 3 + 1, both.len() / 2 + 1);
         let other = |k: usize| both[(both.partition_point(|b| *b < k) * one + two) % both.len()];
-        let unrelated = mean(&|k| distance(looks[k], looks[other(k)]));
+        let unrelated = mean(&|k| distance(look(k), look(other(k))));
+        drop(look);
         if differs > ALIKE * unrelated + 1e-5 {
             self.known.truncate(page);
             self.layers
@@ -127,12 +131,15 @@ impl Gathered {
         }
         let open = |k: usize| self.missing[k] && !self.known[k];
         let hole = |k: usize| {
+            if !open(k) {
+                return false;
+            }
             let p = self
                 .frame
                 .centre(k % self.frame.width, k / self.frame.width);
             // Texels of the other side whose mirror image is not filled are filled themselves.
             let is_copied = || self.frame.texel(reflection.of(p)).is_some_and(open);
-            open(k) && (reflection.side(p) >= 0.0 || !is_copied())
+            reflection.side(p) >= 0.0 || !is_copied()
         };
         self.hole = (0..page).map(hole).collect();
         self.mirror = Some(reflection);
@@ -214,9 +221,17 @@ fn near(frame: &Frame, patch: &PatchChart, known: &[bool]) -> Vec<bool> {
     let [low, high] = bounds(&patch.flat, &patch.faces);
     let reach = 0.5 * (high[0] - low[0]).max(high[1] - low[1]) / frame.step;
     let ([left, bottom], [right, top]) = (frame.texels(low), frame.texels(high));
-    let within = |at: usize| {
-        let (x, y) = ((at % frame.width) as f64, (at / frame.width) as f64);
-        x > left - reach && x < right + reach && y > top - reach && y < bottom + reach
-    };
-    (0..known.len()).map(|at| known[at] && within(at)).collect()
+    let mut near = vec![false; known.len()];
+    let rows = near.chunks_mut(frame.width).zip(known.chunks(frame.width));
+    for (y, (near, known)) in rows.enumerate() {
+        let y = y as f64;
+        if !(y > top - reach && y < bottom + reach) {
+            continue;
+        }
+        for (x, (near, known)) in near.iter_mut().zip(known).enumerate() {
+            let x = x as f64;
+            *near = *known && x > left - reach && x < right + reach;
+        }
+    }
+    near
 }

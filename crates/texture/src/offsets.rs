@@ -114,10 +114,10 @@ pub(crate) fn dominant_offsets(
 }
 
 /// A known texel to compare.
-struct Sample {
+pub(crate) struct Sample {
     /// Column and row.
-    place: Offset,
-    look: Feature,
+    pub place: Offset,
+    pub look: Feature,
 }
 
 /// Samples of the cloth around the hole by their direction from its middle.

@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use crate::features::distance;
-use crate::offsets::{Candidate, Known, Offset, spread};
+use crate::offsets::{Candidate, Known, Offset, Sample, spread};
 
 /// Offsets that are kept.
 const KEPT: usize = 48;
@@ -33,11 +33,12 @@ pub(crate) fn select(raster: &Known, all: &[Candidate], unserved: f32) -> Vec<Ca
         .iter()
         .flat_map(|at| nearest(raster, *at, &beside))
         .collect();
+    let windows: Vec<Vec<Sample>> = beside.iter().map(|at| window(raster, *at)).collect();
     let costs: Vec<Vec<f32>> = all
         .par_iter()
         .map(|candidate| {
-            let at_rim: Vec<Option<f32>> = (beside.iter())
-                .map(|at| window_cost(raster, *at, candidate.offset))
+            let at_rim: Vec<Option<f32>> = (windows.iter())
+                .map(|window| window_cost(raster, window, candidate.offset))
                 .collect();
             let cost = |(at, nearest): &(usize, Vec<usize>)| {
                 if raster.source(*at, candidate.offset).is_none() {
@@ -165,20 +166,32 @@ fn nearest(raster: &Known, at: usize, samples: &[usize]) -> Vec<(usize, Vec<usiz
         .collect()
 }
 
-/// Mean squared difference over a window of the known cloth; `None` when the offset leads most of it to nothing known.
-fn window_cost(raster: &Known, at: usize, [dx, dy]: Offset) -> Option<f32> {
+/// The known texels of a window.
+fn window(raster: &Known, at: usize) -> Vec<Sample> {
     let (x, y) = ((at % raster.width) as i32, (at / raster.width) as i32);
+    WINDOW
+        .into_iter()
+        .flat_map(|v| WINDOW.into_iter().map(move |u| [x + u, y + v]))
+        .filter_map(|place| {
+            let known = raster.at(place[0], place[1]).filter(|at| raster.known[*at]);
+            let look = raster.features[known?];
+            Some(Sample { place, look })
+        })
+        .collect()
+}
+
+/// Mean squared difference over a window of the known cloth; `None` when the offset leads most of it to nothing known.
+fn window_cost(raster: &Known, window: &[Sample], [dx, dy]: Offset) -> Option<f32> {
     let (mut sum, mut count) = (0.0f32, 0);
-    for v in WINDOW {
-        for u in WINDOW {
-            let own = raster.at(x + u, y + v).filter(|at| raster.known[*at]);
-            let other = raster
-                .at(x + u + dx, y + v + dy)
-                .filter(|at| raster.known[*at]);
-            if let (Some(own), Some(other)) = (own, other) {
-                sum += distance(raster.features[own], raster.features[other]);
-                count += 1;
-            }
+    for Sample {
+        place: [x, y],
+        look,
+    } in window
+    {
+        let other = raster.at(x + dx, y + dy).filter(|at| raster.known[*at]);
+        if let Some(other) = other {
+            sum += distance(*look, raster.features[other]);
+            count += 1;
         }
     }
     (count > 4).then(|| sum / count as f32)

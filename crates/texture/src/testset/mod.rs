@@ -41,7 +41,9 @@ impl ClothRaster {
         ClothRaster {
             width: gathered.frame.width,
             texels: gathered.layers[0][..page].to_vec(),
-            hole: (0..page).map(|k| gathered.missing[k] && !known[k]).collect(),
+            hole: (0..page)
+                .map(|k| gathered.missing[k] && !known[k])
+                .collect(),
             known,
             of_image: (0..cut.len())
                 .map(|k| cut.texel(k, gathered.frame.width))
