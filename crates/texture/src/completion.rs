@@ -3,11 +3,13 @@
 use darn_budget::Budget;
 
 use crate::compose::{ComposedLayer, Cut, Field, compose};
+use crate::density;
 use crate::features::Feature;
 use crate::frame::{Frame, bounds};
-use crate::gather::{self, Gathered};
+use crate::gather::Gathered;
 use crate::input::{Cloth, LayerKind, PatchChart, Settings, TextureError};
 use crate::labels::choose;
+use crate::mirror::{self, shows_both_sides};
 use crate::offsets::{Candidate, spread};
 use crate::search::{Found, search, unshade};
 use crate::shading::Shading;
@@ -73,10 +75,14 @@ pub fn estimated_bytes(
 ) -> Result<usize, TextureError> {
     cloth.check()?;
     patch.check()?;
-    let (frame, _) = gather::frame(cloth, patch, settings)?;
+    let frame = density::frame(cloth, patch, settings)?;
     let cut = cut(&frame, patch, settings);
     let layers = LAYER_BYTES * cloth.layers.len();
-    Ok(SEARCH_BYTES + frame.len() * (TEXEL_BYTES + layers) + cut.len() * (BLEND_BYTES + layers))
+    let widened = match shows_both_sides(cloth) {
+        true => mirror::most_texels(&frame, settings.max_side as usize),
+        false => frame.len(),
+    };
+    Ok(SEARCH_BYTES + widened * (TEXEL_BYTES + layers) + cut.len() * (BLEND_BYTES + layers))
 }
 
 /// The part of the raster that the patch's image is.

@@ -20,14 +20,15 @@ const COMPARED: usize = 20_000;
 const ALIKE: f32 = 0.3;
 
 /// The raster around a patch, and the reflection by which the cloth shows its images twice.
-pub(crate) fn frame(
+fn frame(
     cloth: &Cloth,
     patch: &PatchChart,
     settings: &Settings,
+    budget: &Budget,
 ) -> Result<(Frame, Option<Reflection>), TextureError> {
     let frame = density::frame(cloth, patch, settings)?;
     let size = frame.step * frame.width.max(frame.height) as f64;
-    let reflection = reflection(cloth, size);
+    let reflection = reflection(cloth, size, budget)?;
     let frame = reflection.map_or(frame, |r| widened(&frame, &r, settings.max_side as usize));
     Ok((frame, reflection))
 }
@@ -58,7 +59,7 @@ impl Gathered {
         settings: &Settings,
         budget: &Budget,
     ) -> Result<Gathered, TextureError> {
-        let (frame, reflection) = frame(cloth, patch, settings)?;
+        let (frame, reflection) = frame(cloth, patch, settings, budget)?;
         budget.spend(TEXEL_WORK * frame.len() as u64)?;
         let owner = owners(&frame, &cloth.flat, &cloth.faces, budget)?;
         let of_patch = owners(&frame, &patch.flat, &patch.faces, budget)?;
@@ -76,7 +77,7 @@ impl Gathered {
             mirror: None,
         };
         gathered.add_page(cloth, &cloth.flat, &owner, budget)?;
-        leave_cuts(cloth, &frame, &mut gathered.known);
+        leave_cuts(cloth, &frame, &mut gathered.known, budget)?;
         if !gathered.known.contains(&true) {
             return Err(TextureError::Nothing("cloth in the raster"));
         }

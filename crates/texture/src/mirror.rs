@@ -3,9 +3,14 @@
 //! Left and right of many garments lie mirrored on each other in their image. What is missing on one side of the line may be there on the other, so the
 //! cloth's mirror image is a second page to copy from.
 
+use darn_budget::{Budget, Exhausted};
+
 use crate::frame::{Frame, doubled_area};
 use crate::input::Cloth;
 
+/// Nanoseconds of work for a face that is read, and for one that is compared.
+const FACE_WORK: u64 = 60;
+const COMPARED_WORK: u64 = 6;
 /// Faces that are looked at.
 const SAMPLES: usize = 160;
 /// Share of them that must have a partner by the same reflection.
@@ -41,6 +46,24 @@ impl Reflection {
 /// Texels that a side of a frame may gain, as a share of it.
 const MOST_GAIN: f64 = 0.5;
 
+/// Texels that a side may gain.
+fn most_gain(size: usize, max_side: usize) -> usize {
+    ((MOST_GAIN * size as f64) as usize).min(max_side.saturating_sub(size))
+}
+
+/// Texels that a frame has at most once it is [`widened`].
+pub(crate) fn most_texels(frame: &Frame, max_side: usize) -> usize {
+    let [width, height] = [frame.width, frame.height].map(|x| x + most_gain(x, max_side));
+    width * height
+}
+
+/// Whether some faces show their images mirrored and others do not.
+pub(crate) fn shows_both_sides(cloth: &Cloth) -> bool {
+    let mut areas = (0..cloth.faces.len()).filter_map(|k| Some(face(cloth, k)?.area > 0.0));
+    let first = areas.next();
+    areas.any(|side| Some(side) != first)
+}
+
 /// The frame, wide enough for its own mirror image where `max_side` and [`MOST_GAIN`] allow it: what a texel on one side of the line copies, the mirror image of
 /// that texel must find mirrored.
 pub(crate) fn widened(frame: &Frame, reflection: &Reflection, max_side: usize) -> Frame {
@@ -59,7 +82,7 @@ pub(crate) fn widened(frame: &Frame, reflection: &Reflection, max_side: usize) -
     });
     let gains = [0, 1].map(|k: usize| {
         let size = [frame.width, frame.height][k];
-        let most = ((MOST_GAIN * size as f64) as usize).min(max_side.saturating_sub(size));
+        let most = most_gain(size, max_side);
         let low = corners.iter().map(|c| c[k]).fold(0.0, f64::min);
         let high = corners.iter().map(|c| c[k]).fold(size as f64, f64::max);
         let before = ((-low).ceil() as usize).min(most);
@@ -78,25 +101,31 @@ struct Face {
 }
 
 /// The reflection that brings most faces to others with the same places in the image; `None` when the cloth shows nothing twice.
-pub(crate) fn reflection(cloth: &Cloth, size: f64) -> Option<Reflection> {
+pub(crate) fn reflection(
+    cloth: &Cloth,
+    size: f64,
+    budget: &Budget,
+) -> Result<Option<Reflection>, Exhausted> {
+    budget.spend(FACE_WORK * cloth.faces.len() as u64)?;
     let faces: Vec<Face> = (0..cloth.faces.len())
         .filter_map(|k| face(cloth, k))
         .collect();
     let mirrored = faces.iter().filter(|f| f.area > 0.0).count();
     if mirrored == 0 || mirrored == faces.len() {
-        return None;
+        return Ok(None);
     }
     let step = (faces.len() / SAMPLES).max(1);
     let sampled = || faces.iter().step_by(step);
-    let found: Vec<Reflection> = sampled()
-        .filter_map(|face| {
-            let place = centroid(face.at);
-            let other = |o: &&Face| {
-                o.area * face.area < 0.0 && o.material == face.material && holds(o.at, place)
-            };
-            between(face, faces.iter().find(other)?)
-        })
-        .collect();
+    let mut found: Vec<Reflection> = Vec::new();
+    for face in sampled() {
+        budget.spend(COMPARED_WORK * faces.len() as u64)?;
+        let place = centroid(face.at);
+        let other = |o: &&Face| {
+            o.area * face.area < 0.0 && o.material == face.material && holds(o.at, place)
+        };
+        let other = faces.iter().find(other);
+        found.extend(other.and_then(|other| between(face, other)));
+    }
     let same = |a: &Reflection, b: &Reflection| {
         let turn = (a.angle - b.angle)
             .sin()
@@ -106,19 +135,21 @@ pub(crate) fn reflection(cloth: &Cloth, size: f64) -> Option<Reflection> {
         turn < SAME_ANGLE && away < SAME_PLACE * size
     };
     let supporters = |r: &Reflection| found.iter().filter(|o| same(r, o)).count();
-    let best = found.iter().rev().max_by_key(|r| supporters(r))?;
+    let Some(best) = found.iter().rev().max_by_key(|r| supporters(r)) else {
+        return Ok(None);
+    };
     let all: Vec<&Reflection> = found.iter().filter(|o| same(best, o)).collect();
     if (all.len() as f64) < LEAST_SHARE * sampled().count() as f64 {
-        return None;
+        return Ok(None);
     }
     let count = all.len() as f64;
     let mean = |of: &dyn Fn(&Reflection) -> f64| all.iter().map(|r| of(r)).sum::<f64>() / count;
     let (sin, cos) = (mean(&|r| r.angle.sin()), mean(&|r| r.angle.cos()));
     let shift = [mean(&|r| r.shift[0]), mean(&|r| r.shift[1])];
-    Some(Reflection {
+    Ok(Some(Reflection {
         angle: sin.atan2(cos),
         shift,
-    })
+    }))
 }
 
 fn face(cloth: &Cloth, index: usize) -> Option<Face> {
@@ -196,13 +227,15 @@ mod tests {
     #[test]
     fn a_folded_map_has_the_fold_as_its_line_and_others_have_none() {
         let scan = TestScan::new(Fabric::Plain, Layout::Mirrored, 64);
-        let found = reflection(&scan.cloth(), 128.0).unwrap();
+        let budget = Budget::unlimited();
+        let found = reflection(&scan.cloth(), 128.0, budget).unwrap().unwrap();
         // The fold is two squares of 3.2 texels right of the middle.
         let [x, y] = found.of([10.0, 20.0]);
         assert!((x - 2.8).abs() < 0.05 && (y - 20.0).abs() < 0.05, "{x} {y}");
         for layout in [Layout::OneMap, Layout::Atlas] {
             let scan = TestScan::new(Fabric::Plain, layout, 64);
-            assert_eq!(reflection(&scan.cloth(), 128.0), None);
+            let found = reflection(&scan.cloth(), 128.0, budget).unwrap();
+            assert_eq!(found, None);
         }
     }
 }

@@ -2,16 +2,27 @@
 
 use std::collections::BTreeMap;
 
+use darn_budget::{Budget, Exhausted};
+
 use crate::frame::Frame;
 use crate::input::Cloth;
 
+/// Nanoseconds of work for a face, and for a texel beside a cut.
+const FACE_WORK: u64 = 400;
+const TEXEL_WORK: u64 = 6;
 /// Texels beside a cut that are not copied.
 const REACH: f64 = 1.5;
 /// Share of the cloth's texels that may be lost; cloth that is cut into smaller pieces is copied as it is.
 const MOST_LOST: f64 = 0.4;
 
 /// Takes the texels beside cuts out of the known ones.
-pub(crate) fn leave_cuts(cloth: &Cloth, frame: &Frame, known: &mut [bool]) {
+pub(crate) fn leave_cuts(
+    cloth: &Cloth,
+    frame: &Frame,
+    known: &mut [bool],
+    budget: &Budget,
+) -> Result<(), Exhausted> {
+    budget.spend(FACE_WORK * cloth.faces.len() as u64)?;
     let mut kept = known.to_vec();
     for edge in cuts(cloth) {
         let [a, b] = edge.map(|v| frame.texels(cloth.flat[v as usize]));
@@ -20,8 +31,10 @@ pub(crate) fn leave_cuts(cloth: &Cloth, frame: &Frame, known: &mut [bool]) {
             let high = (a[k].max(b[k]) + REACH).ceil().max(0.0) as usize;
             low..high.min(size)
         };
-        for y in side(1, frame.height) {
-            for x in side(0, frame.width) {
+        let (rows, columns) = (side(1, frame.height), side(0, frame.width));
+        budget.spend(TEXEL_WORK * (rows.len() * columns.len()) as u64)?;
+        for y in rows {
+            for x in columns.clone() {
                 if distance([x as f64 + 0.5, y as f64 + 0.5], a, b) < REACH {
                     kept[y * frame.width + x] = false;
                 }
@@ -32,6 +45,7 @@ pub(crate) fn leave_cuts(cloth: &Cloth, frame: &Frame, known: &mut [bool]) {
     if count(&kept) >= (1.0 - MOST_LOST) * count(known) {
         known.copy_from_slice(&kept);
     }
+    Ok(())
 }
 
 /// Edges between faces that read different places of an image, or different images.
@@ -116,7 +130,7 @@ mod tests {
             height: 20,
         };
         let mut known = vec![true; 80 * 20];
-        leave_cuts(&cloth, &frame, &mut known);
+        leave_cuts(&cloth, &frame, &mut known, Budget::unlimited()).unwrap();
         for x in 0..80 {
             let near = (39..41).contains(&x);
             assert_eq!(known[10 * 80 + x], !near, "{x}");
