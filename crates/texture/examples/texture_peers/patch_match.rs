@@ -163,7 +163,7 @@ impl Matches {
         let height = picture.height() as i64;
         let side = if back { 1 } else { -1 };
         for at in all {
-            let mut try_source = |matches: &mut Matches, found: i64| {
+            let try_source = |matches: &mut Matches, found: i64| {
                 if found < 0 || !sources.get(found as usize).is_some_and(|s| *s) {
                     return;
                 }

@@ -40,7 +40,7 @@ pub fn fill(picture: &Picture, side: usize) -> Picture {
             if !texels.iter().any(|at| picture.hole[*at]) {
                 continue;
             }
-            let found = best(&made, &shown, &texels, &corners, side, &mut random);
+            let found = best(&made, &shown, &texels, &corners, &mut random);
             let old = cut(&made, &shown, &texels, found, side);
             for (k, at) in texels.iter().enumerate() {
                 let source = found + k / side * width + k % side;
@@ -69,13 +69,13 @@ fn best(
     shown: &[bool],
     texels: &[usize],
     corners: &[usize],
-    side: usize,
     random: &mut Random,
 ) -> usize {
     let width = made.width;
+    let side = texels.len().isqrt();
     // Every third texel of what is there tells enough.
     let there: Vec<usize> = (0..texels.len())
-        .filter(|k| shown[texels[*k]] && (k % side + k / side) % 3 == 0)
+        .filter(|k| shown[texels[*k]] && (k % side + k / side).is_multiple_of(3))
         .collect();
     let cost = |corner: usize, most: f32| {
         let mut sum = 0.0;
@@ -91,7 +91,8 @@ fn best(
     let mut least = f32::INFINITY;
     let mut costs: Vec<(f32, usize)> = Vec::new();
     for corner in corners {
-        if corner % width % STEP != 0 || corner / width % STEP != 0 {
+        let [x, y] = [corner % width, corner / width];
+        if !(x.is_multiple_of(STEP) && y.is_multiple_of(STEP)) {
             continue;
         }
         let own = cost(*corner, 2.0 * least);
