@@ -115,7 +115,7 @@ pub(super) fn read_mesh_file(
         let content = SceneContent::default();
         return Err(ScanError::NoTriangles { content });
     }
-    let as_gltf = MeshAsGltf::of(mesh).ok_or_else(|| MeshFileError::Limit {
+    let as_gltf = MeshAsGltf::of(mesh).ok_or(MeshFileError::Limit {
         what: "bytes as a glTF",
         limit: "GLB length",
         allowed: u32::MAX as usize,

@@ -169,10 +169,11 @@ proptest! {
             changed[at] = byte;
         }
         if let Some(format) = MeshFormat::of(&changed) {
-            if let Ok(file) = MeshFile::read(Bytes::from(changed.clone()), format, LIMITS, Budget::unlimited()) {
-                if file.mesh().positions.len() > 1 {
-                    file.with_patches(&[patch(file.mesh())], DIGEST);
-                }
+            let bytes = Bytes::from(changed.clone());
+            if let Ok(file) = MeshFile::read(bytes, format, LIMITS, Budget::unlimited())
+                && file.mesh().positions.len() > 1
+            {
+                file.with_patches(&[patch(file.mesh())], DIGEST);
             }
             without_patches(&changed, format);
         }

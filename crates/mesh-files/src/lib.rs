@@ -78,7 +78,7 @@ pub struct MeshFile {
 #[derive(Debug, Clone)]
 enum Layout {
     Obj(ObjFile),
-    Ply(PlyFile),
+    Ply(Box<PlyFile>),
 }
 
 impl MeshFile {
@@ -104,7 +104,7 @@ impl MeshFile {
                 let (mesh, file) = ply::read(bytes, limits, budget)?;
                 MeshFile {
                     mesh,
-                    layout: Layout::Ply(file),
+                    layout: Layout::Ply(file.into()),
                 }
             }
         })
