@@ -24,6 +24,7 @@ const LEASE: Duration = Duration::from_secs(30);
 const CLAIMANT: Claimant<'static> = Claimant {
     worker: "worker",
     company: Company::Alone,
+    limits: None,
 };
 
 fn failed() -> Outcome {

@@ -252,7 +252,20 @@ pub struct Claimant<'a> {
     pub worker: &'a str,
     /// Whether its process runs other jobs.
     pub company: Company,
+    /// How many jobs of some clients may run.
+    pub limits: Option<&'a RunningLimits>,
 }
+
+impl Claimant<'_> {
+    /// Whether no more than the `running` jobs of a client may run.
+    pub(crate) fn is_at_limit(&self, client: &str, running: i64) -> bool {
+        let limit = self.limits.and_then(|limits| limits.get(client));
+        limit.is_some_and(|most| running >= *most)
+    }
+}
+
+/// Most jobs that may run at once of each of these clients, on all machines; of others, any number may.
+pub type RunningLimits = std::collections::BTreeMap<String, i64>;
 
 /// Whether the process of a worker runs other jobs.
 ///

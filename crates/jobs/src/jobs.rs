@@ -26,8 +26,8 @@ use super::{
     company::RunningJobs,
     error::JobError,
     job::{
-        Claimant, ClientCounts, Job, ListQuery, NewJob, Page, Retention, State, Submission,
-        Submitted,
+        Claimant, ClientCounts, Job, ListQuery, NewJob, Page, Retention, RunningLimits, State,
+        Submission, Submitted,
     },
     store::{Clock, ExpiredLeases, Store},
 };
@@ -287,7 +287,17 @@ impl Jobs {
     ///
     /// Safe to drop: a job that was claimed by then is given back.
     pub async fn claim(self: &Arc<Self>, worker: &str) -> Result<Option<ClaimedJob>, JobError> {
+        self.claim_within(worker, &Arc::default()).await
+    }
+
+    /// [`Self::claim`] that passes over clients of whom as many jobs run as may.
+    pub async fn claim_within(
+        self: &Arc<Self>,
+        worker: &str,
+        limits: &Arc<RunningLimits>,
+    ) -> Result<Option<ClaimedJob>, JobError> {
         let (jobs, worker) = (Arc::clone(self), worker.to_owned());
+        let limits = Arc::clone(limits);
         // In a task of its own, so that an answer of the database finds somebody who gives the job back.
         let claim = tokio::spawn(async move {
             let _turn = jobs.claims.lock().await;
@@ -297,6 +307,7 @@ impl Jobs {
             let claimant = Claimant {
                 worker: &worker,
                 company,
+                limits: Some(&limits),
             };
             let stops = jobs.stops();
             let Some(claimed) = jobs.store.claim(&claimant).await? else {

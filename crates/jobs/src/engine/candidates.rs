@@ -1,5 +1,5 @@
 //! The clients with waiting jobs (`client`) in the order in which they are served, at most `$1`, with the attempts of the first job of each
-//! (`attempt`).
+//! (`attempt`) and how many jobs of each run (`running`).
 //!
 //! A client of whom the fewest jobs run comes first; among those, the one whose first job has the highest priority; then the one whose first job is
 //! oldest.
@@ -21,7 +21,7 @@ pub(super) const SQLITE: &str = "
     loads (client, running) AS (
         SELECT client, count(*) FROM jobs WHERE state = 'running' GROUP BY client
     )
-    SELECT head.client AS client, head.attempt AS attempt
+    SELECT head.client AS client, head.attempt AS attempt, coalesce(loads.running, 0) AS running
     FROM heads JOIN jobs head ON head.number = heads.number LEFT JOIN loads ON loads.client = head.client
     ORDER BY coalesce(loads.running, 0), head.priority DESC, head.number LIMIT $1";
 
@@ -39,6 +39,6 @@ pub(super) const POSTGRES: &str = "
     loads (client, running) AS (
         SELECT client, count(*) FROM jobs WHERE state = 'running' GROUP BY client
     )
-    SELECT heads.client AS client, heads.attempt AS attempt
+    SELECT heads.client AS client, heads.attempt AS attempt, coalesce(loads.running, 0) AS running
     FROM heads LEFT JOIN loads ON loads.client = heads.client
     ORDER BY coalesce(loads.running, 0), heads.priority DESC, heads.number LIMIT $1";

@@ -23,15 +23,21 @@ impl Store {
     /// so a client can get as many jobs more than its turn as there are such claims; no job is given out twice.
     pub async fn claim(&self, claimant: &Claimant<'_>) -> Result<Option<Claimed>, JobError> {
         let _turn = self.claims.lock().await;
+        // Clients that may run no more stand in front where others run more than they may.
+        let limited = claimant.limits.map_or(0, |limits| limits.len());
+        let wanted = CANDIDATES.saturating_add(i64::try_from(limited).unwrap_or(i64::MAX));
         let candidates = self
             .engine
-            .read(self.engine.dialect().candidates, args![CANDIDATES]);
+            .read(self.engine.dialect().candidates, args![wanted]);
         for candidate in candidates.await? {
+            let client = candidate.some("client", Row::text)?;
+            if claimant.is_at_limit(&client, candidate.some("running", Row::int)?) {
+                continue;
+            }
             let has_crashed = candidate.some("attempt", Row::int)? > 0;
             if has_crashed && claimant.company == Company::Shared {
                 return Ok(None);
             }
-            let client = candidate.some("client", Row::text)?;
             if let Some(claimed) = self.claim_of(&client, claimant).await? {
                 return Ok(Some(claimed));
             }

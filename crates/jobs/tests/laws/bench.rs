@@ -152,6 +152,7 @@ pub async fn claim(store: &Store) -> Option<Claimed> {
     let claimant = Claimant {
         worker: "worker",
         company: Company::Alone,
+        limits: None,
     };
     store.claim(&claimant).await.unwrap()
 }

@@ -1,8 +1,11 @@
 //! Who is served next.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
 
-use darn_jobs::{Claimant, Company, Submission};
+use darn_jobs::{Claimant, Company, RunningLimits, Submission};
 
 use crate::bench::{Bench, PAST_LEASE, claim, law, product, submission, submit};
 
@@ -106,7 +109,7 @@ law! {
         bench.clock.advance(PAST_LEASE);
         jobs.expire_leases().await.unwrap();
         submit(&jobs, "client").await;
-        let shared = Claimant { worker: "worker", company: Company::Shared };
+        let shared = Claimant { worker: "worker", company: Company::Shared, limits: None };
         // It is next, and it must be alone: so nothing starts beside the jobs that run.
         assert_eq!(jobs.store().claim(&shared).await.unwrap(), None);
 
@@ -121,5 +124,34 @@ law! {
             beside.push(jobs.claim("worker").await.unwrap().unwrap());
         }
         assert!(jobs.claim("worker").await.unwrap().is_none());
+    }
+}
+
+law! {
+    async fn no_more_jobs_of_a_client_run_than_may(bench: Bench) {
+        let jobs = bench.open().await;
+        // More clients than a claim tries in turn where none has a limit, all of them in front of the last one.
+        let limits: Arc<RunningLimits> = Arc::new((0..40).map(|n| (format!("client {n:02}"), 1)).collect());
+        for client in limits.keys() {
+            submit(&jobs, client).await;
+            submit(&jobs, client).await;
+        }
+        submit(&jobs, "without a limit").await;
+        submit(&jobs, "without a limit").await;
+        let mut running = BTreeMap::new();
+        let mut claimed = Vec::new();
+        while let Some(job) = jobs.claim_within("worker", &limits).await.unwrap() {
+            *running.entry(job.job().client.clone()).or_insert(0) += 1;
+            claimed.push(job);
+        }
+        assert_eq!(running.remove("without a limit"), Some(2));
+        assert!(running.len() == limits.len() && running.values().all(|count| *count == 1), "{running:?}");
+        // One that ends makes room for the next of its client.
+        let mut first = claimed.remove(0);
+        let client = first.job().client.clone();
+        first.cancelled().await.unwrap();
+        let next = jobs.claim_within("worker", &limits).await.unwrap().unwrap();
+        assert_eq!(next.job().client, client);
+        assert!(jobs.claim_within("worker", &limits).await.unwrap().is_none());
     }
 }

@@ -318,6 +318,7 @@ impl Model {
         let claimant = Claimant {
             worker: "worker",
             company,
+            limits: None,
         };
         let found = self.store.store().claim(&claimant).await.unwrap();
         let running = |client: &str| {
