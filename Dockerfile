@@ -30,6 +30,7 @@ RUN cargo build --release --locked --bin darn
 # --- run: the binary with its weights built in, glibc, and a user that is not root
 FROM gcr.io/distroless/cc-debian12:nonroot
 COPY --from=build /src/target/release/darn /usr/local/bin/darn
+# Other machines can reach it: it starts with DARN_KEYS, or with DARN_ALLOW_ANONYMOUS=true, and with neither says so and ends (README, Working on it).
 ENV DARN_LISTEN=0.0.0.0:8080
 # distroless's nonroot, by number so that an orchestrator can check it.
 USER 65532:65532

@@ -408,3 +408,73 @@ fn lines_of_json_tell_stages_and_the_outcome() {
         (Some(0), Some(true))
     );
 }
+
+/// What `darn key new` prints: the secret, and the entry.
+fn new_key(options: &[&str]) -> (String, String) {
+    let output = darn().args(["key", "new"]).args(options).output();
+    let output = output.expect("darn runs");
+    assert!(output.status.success());
+    let text = String::from_utf8(output.stdout).expect("text");
+    let mut lines = text.lines().map(str::to_owned);
+    let (secret, entry) = (lines.next(), lines.next());
+    assert_eq!(lines.next(), None, "{text}");
+    let note = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(note.contains("Authorization: Bearer") && note.contains("--keys"));
+    let secret = secret.expect("the secret");
+    assert!(!note.contains(&secret));
+    (secret, entry.expect("the entry"))
+}
+
+#[tokio::test]
+async fn a_new_key_opens_the_service_whose_file_has_its_entry() {
+    let (secret, entry) = new_key(&["--id", "lab"]);
+    let (other, _) = new_key(&["--id", "lab"]);
+    assert_ne!(secret, other);
+    let options = ["--scopes", "metrics", "--expires", "2000-01-01T00:00:00Z"];
+    let (expired, second) = new_key(&[&["--id", "old"], &options[..]].concat());
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("keys.json");
+    std::fs::write(&file, format!("{{\"keys\": [{entry}, {second}]}}")).expect("written");
+    let service = Service::start_with(&["--keys", file.to_str().expect("a path")]);
+    let client = reqwest::Client::new();
+    for (key, status) in [(&secret, 200), (&other, 401), (&expired, 401)] {
+        let request = client.get(service.url("/info")).bearer_auth(key);
+        assert_eq!(request.send().await.expect("an answer").status(), status);
+    }
+}
+
+#[test]
+fn wrong_settings_of_keys_end_the_program_at_once() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("keys.json");
+    std::fs::write(&file, "{\"keys\": [}").expect("written");
+    let file = file.to_str().expect("a path");
+    for (options, said) in [
+        (vec!["serve", "--listen", "0.0.0.0:0"], "--allow-anonymous"),
+        (
+            vec!["serve", "--listen", "127.0.0.1:0", "--keys", file],
+            "line 1 column 11",
+        ),
+        (
+            vec!["serve", "--keys", file, "--allow-anonymous"],
+            "cannot be used with",
+        ),
+        (
+            vec!["key", "new", "--id", "a b"],
+            "an id has 1 to 64 letters",
+        ),
+        (
+            vec!["key", "new", "--id", "a", "--scopes", "all"],
+            "[possible values: mend, jobs",
+        ),
+        (
+            vec!["key", "new", "--id", "a", "--expires", "soon"],
+            "RFC 3339",
+        ),
+    ] {
+        let output = darn().args(&options).output().expect("darn runs");
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(64), "{options:?}: {text}");
+        assert!(text.contains(said), "{options:?}: {text}");
+    }
+}

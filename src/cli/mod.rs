@@ -14,6 +14,7 @@ mod garments;
 mod healthcheck;
 mod holes;
 mod inpaint;
+mod key;
 #[cfg(feature = "burn")]
 mod mended;
 mod network;
@@ -55,7 +56,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum CliCommand {
     /// Serve HTTP: POST a scan to /inpaint, get it back mended
-    Serve(ServeCommand),
+    Serve(Box<ServeCommand>),
     /// Fill the holes of a scan
     Inpaint(inpaint::InpaintArgs),
     /// Take everything out of a scan that darn put in
@@ -85,6 +86,8 @@ enum CliCommand {
     Evaluate(evaluate::EvaluateArgs),
     /// Measure how long the network and a mend take here
     Bench(bench::BenchArgs),
+    /// Make keys for a service
+    Key(key::KeyArgs),
     /// Print the service's OpenAPI document
     Openapi,
 }
@@ -136,6 +139,7 @@ fn run(command: CliCommand) -> Result<(), Failure> {
         #[cfg(feature = "burn")]
         CliCommand::Evaluate(args) => evaluate::run(&args),
         CliCommand::Bench(args) => bench::run(&args),
+        CliCommand::Key(args) => key::run(&args),
         CliCommand::Openapi => openapi::run(),
     }
 }

@@ -5,7 +5,7 @@ use super::network;
 use crate::allocator;
 use crate::settings::ServeCommand;
 use darn_mend::{NetworkMender, SharedMender};
-use darn_serve::{LogDelivery, LogError, start_logging};
+use darn_serve::{LogDelivery, LogError, ServeError, start_logging};
 use std::sync::Arc;
 
 /// Runs `darn serve`.
@@ -34,5 +34,11 @@ pub fn run(settings: &ServeCommand) -> Result<(), Failure> {
     let mender = Arc::new(mender);
     let idle = Arc::clone(&mender);
     allocator::give_back_when_idle(move |unused| idle.release_idle(unused));
-    darn_serve::run(serve, Arc::new(SharedMender(mender))).or_fail("serve")
+    match darn_serve::run(serve, Arc::new(SharedMender(mender))) {
+        // Settings that are wrong, as those that clap refuses.
+        Err(error @ (ServeError::Exposed { .. } | ServeError::Keys(_))) => {
+            Err(Failure::Usage(error.to_string()))
+        }
+        outcome => outcome.or_fail("serve"),
+    }
 }

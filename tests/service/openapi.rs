@@ -29,7 +29,7 @@ async fn the_committed_document_is_the_served_one() {
 }
 
 #[test]
-fn every_reference_has_its_schema() {
+fn every_reference_leads_somewhere() {
     let document = darn_serve::openapi::document();
     let schemas = document["components"]["schemas"].as_object().unwrap();
     let mut open = vec![&document];
@@ -37,8 +37,8 @@ fn every_reference_has_its_schema() {
         match value {
             Value::Object(fields) => {
                 if let Some(Value::String(reference)) = fields.get("$ref") {
-                    let name = reference.strip_prefix("#/components/schemas/").unwrap();
-                    assert!(schemas.contains_key(name), "{name}");
+                    let pointer = reference.strip_prefix('#').unwrap();
+                    assert!(document.pointer(pointer).is_some(), "{reference}");
                 }
                 open.extend(fields.values());
             }

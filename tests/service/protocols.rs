@@ -12,7 +12,7 @@ use crate::fake::{Behaviour, FakeScan};
 use crate::harness::Service;
 
 /// A scan in two chunks, the first with the constraints.
-fn chunks(
+pub fn chunks(
     scan: impl Into<FakeScan>,
     constraints: Option<Constraints>,
 ) -> tokio_stream::Iter<std::vec::IntoIter<ScanChunk>> {

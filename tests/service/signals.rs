@@ -30,7 +30,7 @@ fn serves_until_signalled() {
             "60s".into(),
         ];
         let settings = Settings::parse_from(settings).serve;
-        let _log = start_logging("info", LogFormat::Text, LogDelivery::Queued).unwrap();
+        let _log = start_logging(&settings.log, LogFormat::Text, LogDelivery::Queued).unwrap();
         run(&settings, Arc::new(FakeMender::default())).unwrap_or_else(|error| panic!("{error}"));
     }
 }
@@ -61,13 +61,19 @@ impl Drop for Process {
 /// Starts a service in another process, whose log goes to `stderr`, and waits until it is ready.
 pub fn start(stderr: Stdio) -> (Process, SocketAddr) {
     let (mut program, address) = service_behind(Command::new(std::env::current_exe().unwrap()));
-    let child = Process(program.stderr(stderr).spawn().unwrap());
+    program.stderr(stderr);
+    (start_behind(program, address), address)
+}
+
+/// Starts a service in another process and waits until it is ready.
+pub fn start_behind(mut program: Command, address: SocketAddr) -> Process {
+    let child = Process(program.spawn().unwrap());
     let end = Instant::now() + TIMEOUT;
     while healthcheck(address, TIMEOUT).is_err() {
         assert!(Instant::now() < end, "the service never was ready");
         std::thread::sleep(Duration::from_millis(10));
     }
-    (child, address)
+    child
 }
 
 pub fn signal(child: &Child) {

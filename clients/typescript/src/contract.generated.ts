@@ -395,6 +395,9 @@ export interface paths {
                         "text/plain": unknown;
                     };
                 };
+                401: components["responses"]["KeyRefused"];
+                403: components["responses"]["ScopeMissing"];
+                429: components["responses"]["QuotaExceeded"];
             };
         };
         put?: never;
@@ -1092,7 +1095,7 @@ export interface components {
          * @description The words of this version; later ones may have more
          * @enum {string}
          */
-        ProblemCode: "empty_body" | "malformed_request" | "digest_mismatch" | "no_query" | "not_found" | "method_not_allowed" | "body_timeout" | "body_too_large" | "message_too_large" | "constraints_too_large" | "query_too_large" | "unsupported_content_encoding" | "unsupported_media_type" | "invalid_constraints" | "invalid_query" | "session_not_found" | "session_expired" | "session_evicted" | "session_deleted" | "session_too_large" | "session_busy" | "sessions_full" | "jobs_not_kept" | "no_such_job" | "job_unfinished" | "job_wrong_state" | "job_expired" | "idempotency_mismatch" | "job_crashed_worker" | "storage_full" | "internal" | "queue_full" | "memory_full" | "uploads_full" | "draining" | "warming_up" | "deadline_exceeded" | "not_a_gltf" | "invalid_gltf" | "invalid_mesh_file" | "scan_too_large" | "index_out_of_range" | "position_not_finite" | "unsupported_extension" | "external_data" | "no_triangles" | "singular_transform" | "constraints_do_not_fit" | "anchor_out_of_reach" | "too_much_work" | "too_much_memory" | "answer_too_large" | "no_holes" | "nothing_to_strip" | "too_many_holes" | "non_manifold_rim" | "coordinates_too_large" | "not_a_disk" | "not_cloth_like" | "too_little_known" | "rim_crosses_itself" | "patch_degenerate" | "no_plausible_fill" | "hole_too_narrow";
+        ProblemCode: "empty_body" | "malformed_request" | "digest_mismatch" | "no_query" | "not_found" | "method_not_allowed" | "body_timeout" | "body_too_large" | "message_too_large" | "constraints_too_large" | "query_too_large" | "unsupported_content_encoding" | "unsupported_media_type" | "invalid_constraints" | "invalid_query" | "key_missing" | "key_unknown" | "key_expired" | "insufficient_scope" | "quota_exceeded" | "session_not_found" | "session_expired" | "session_evicted" | "session_deleted" | "session_too_large" | "session_busy" | "sessions_full" | "jobs_not_kept" | "no_such_job" | "job_unfinished" | "job_wrong_state" | "job_expired" | "idempotency_mismatch" | "job_crashed_worker" | "storage_full" | "internal" | "queue_full" | "memory_full" | "uploads_full" | "draining" | "warming_up" | "deadline_exceeded" | "not_a_gltf" | "invalid_gltf" | "invalid_mesh_file" | "scan_too_large" | "index_out_of_range" | "position_not_finite" | "unsupported_extension" | "external_data" | "no_triangles" | "singular_transform" | "constraints_do_not_fit" | "anchor_out_of_reach" | "too_much_work" | "too_much_memory" | "answer_too_large" | "no_holes" | "nothing_to_strip" | "too_many_holes" | "non_manifold_rim" | "coordinates_too_large" | "not_a_disk" | "not_cloth_like" | "too_little_known" | "rim_crosses_itself" | "patch_degenerate" | "no_plausible_fill" | "hole_too_narrow";
         /** @description The version, and the limits that a client can check before it sends a scan */
         Info: {
             /** @description darn's version */
@@ -1107,9 +1110,60 @@ export interface components {
                 /** @description A session ends after so long without a request */
                 sessionIdleSeconds: number;
             };
+            /** @description The key that came with the request; absent where the service takes no keys */
+            key?: {
+                id: string;
+                scopes: ("mend" | "jobs" | "metrics" | "admin")[];
+                /** @description What the key may take; nothing bounds what is left out */
+                limits: {
+                    requestsPerMinute?: number;
+                    bytesPerDay?: number;
+                    waitingJobs?: number;
+                    runningJobs?: number;
+                    sessions?: number;
+                };
+                /** Format: date-time */
+                expires?: string;
+            };
         };
     };
-    responses: never;
+    responses: {
+        /** @description The service takes keys, and the request has none (`key_missing`) or one that is not known (`key_unknown`) or has expired (`key_expired`) */
+        KeyRefused: {
+            headers: {
+                /** @description `Bearer`, with what is wrong (RFC 6750) */
+                "www-authenticate"?: string;
+                [name: string]: unknown;
+            };
+            content: {
+                "application/problem+json": components["schemas"]["Problem"];
+            };
+        };
+        /** @description The key does not have the scope that this takes (`insufficient_scope`) */
+        ScopeMissing: {
+            headers: {
+                [name: string]: unknown;
+            };
+            content: {
+                "application/problem+json": components["schemas"]["Problem"];
+            };
+        };
+        /** @description The key has used up a quota (`quota_exceeded`), or too many requests for one session came at once (`session_busy`) */
+        QuotaExceeded: {
+            headers: {
+                /** @description What is left of each quota */
+                ratelimit?: string;
+                /** @description The quotas of the key (draft-ietf-httpapi-ratelimit-headers) */
+                "ratelimit-policy"?: string;
+                /** @description Seconds after which there is room again */
+                "retry-after"?: string;
+                [name: string]: unknown;
+            };
+            content: {
+                "application/problem+json": components["schemas"]["Problem"];
+            };
+        };
+    };
     parameters: never;
     requestBodies: never;
     headers: never;
@@ -1192,6 +1246,8 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            401: components["responses"]["KeyRefused"];
+            403: components["responses"]["ScopeMissing"];
             /** @description The body stopped coming */
             408: {
                 headers: {
@@ -1228,6 +1284,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            429: components["responses"]["QuotaExceeded"];
             /** @description An error of the service; its log has it under the request id */
             500: {
                 headers: {
@@ -1300,6 +1357,8 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            401: components["responses"]["KeyRefused"];
+            403: components["responses"]["ScopeMissing"];
             /** @description The body stopped coming */
             408: {
                 headers: {
@@ -1336,6 +1395,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            429: components["responses"]["QuotaExceeded"];
             /** @description An error of the service; its log has it under the request id */
             500: {
                 headers: {
@@ -1409,6 +1469,8 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            401: components["responses"]["KeyRefused"];
+            403: components["responses"]["ScopeMissing"];
             /** @description The body stopped coming */
             408: {
                 headers: {
@@ -1445,6 +1507,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            429: components["responses"]["QuotaExceeded"];
             /** @description An error of the service; its log has it under the request id */
             500: {
                 headers: {
@@ -1526,6 +1589,8 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            401: components["responses"]["KeyRefused"];
+            403: components["responses"]["ScopeMissing"];
             /** @description The body stopped coming */
             408: {
                 headers: {
@@ -1562,6 +1627,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            429: components["responses"]["QuotaExceeded"];
             /** @description An error of the service; its log has it under the request id */
             500: {
                 headers: {
@@ -1634,6 +1700,8 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            401: components["responses"]["KeyRefused"];
+            403: components["responses"]["ScopeMissing"];
             /** @description The body stopped coming */
             408: {
                 headers: {
@@ -1670,6 +1738,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            429: components["responses"]["QuotaExceeded"];
             /** @description An error of the service; its log has it under the request id */
             500: {
                 headers: {
@@ -1719,6 +1788,8 @@ export interface operations {
                     "application/json": components["schemas"]["Session"];
                 };
             };
+            401: components["responses"]["KeyRefused"];
+            403: components["responses"]["ScopeMissing"];
             /** @description There is no session of this id */
             404: {
                 headers: {
@@ -1746,15 +1817,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests for this session are under way */
-            429: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
+            429: components["responses"]["QuotaExceeded"];
             /** @description An error of the service; its log has it under the request id */
             500: {
                 headers: {
@@ -1802,6 +1865,8 @@ export interface operations {
                 };
                 content?: never;
             };
+            401: components["responses"]["KeyRefused"];
+            403: components["responses"]["ScopeMissing"];
             /** @description There is no session of this id */
             404: {
                 headers: {
@@ -1820,6 +1885,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            429: components["responses"]["QuotaExceeded"];
             /** @description The service shuts down */
             503: {
                 headers: {
@@ -1881,6 +1947,8 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            401: components["responses"]["KeyRefused"];
+            403: components["responses"]["ScopeMissing"];
             /** @description There is no session of this id */
             404: {
                 headers: {
@@ -1935,15 +2003,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests for this session are under way */
-            429: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
+            429: components["responses"]["QuotaExceeded"];
             /** @description An error of the service; its log has it under the request id */
             500: {
                 headers: {
@@ -2008,6 +2068,8 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            401: components["responses"]["KeyRefused"];
+            403: components["responses"]["ScopeMissing"];
             /** @description There is no session of this id */
             404: {
                 headers: {
@@ -2062,15 +2124,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests for this session are under way */
-            429: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
+            429: components["responses"]["QuotaExceeded"];
             /** @description An error of the service; its log has it under the request id */
             500: {
                 headers: {
@@ -2135,6 +2189,8 @@ export interface operations {
                     };
                 };
             };
+            401: components["responses"]["KeyRefused"];
+            403: components["responses"]["ScopeMissing"];
             /** @description There is no session of this id */
             404: {
                 headers: {
@@ -2162,15 +2218,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too many requests for this session are under way */
-            429: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/problem+json": components["schemas"]["Problem"];
-                };
-            };
+            429: components["responses"]["QuotaExceeded"];
             /** @description An error of the service; its log has it under the request id */
             500: {
                 headers: {
@@ -2234,6 +2282,8 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            401: components["responses"]["KeyRefused"];
+            403: components["responses"]["ScopeMissing"];
             /** @description With code `jobs_not_kept`: the service was started without `--data` */
             404: {
                 headers: {
@@ -2243,6 +2293,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            429: components["responses"]["QuotaExceeded"];
         };
     };
     submitJob: {
@@ -2296,6 +2347,8 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            401: components["responses"]["KeyRefused"];
+            403: components["responses"]["ScopeMissing"];
             /** @description With code `jobs_not_kept`: the service was started without `--data` */
             404: {
                 headers: {
@@ -2341,6 +2394,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            429: components["responses"]["QuotaExceeded"];
             /** @description An error of the service; its log has it under the request id */
             500: {
                 headers: {
@@ -2390,6 +2444,8 @@ export interface operations {
                     "application/json": components["schemas"]["Job"];
                 };
             };
+            401: components["responses"]["KeyRefused"];
+            403: components["responses"]["ScopeMissing"];
             /** @description There is no job of this id, or it is forgotten; with code `jobs_not_kept`: the service was started without `--data` */
             404: {
                 headers: {
@@ -2399,6 +2455,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            429: components["responses"]["QuotaExceeded"];
         };
     };
     deleteJob: {
@@ -2419,6 +2476,8 @@ export interface operations {
                 };
                 content?: never;
             };
+            401: components["responses"]["KeyRefused"];
+            403: components["responses"]["ScopeMissing"];
             /** @description There is no job of this id, or it is forgotten; with code `jobs_not_kept`: the service was started without `--data` */
             404: {
                 headers: {
@@ -2428,6 +2487,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            429: components["responses"]["QuotaExceeded"];
         };
     };
     jobResult: {
@@ -2466,6 +2526,8 @@ export interface operations {
                     };
                 };
             };
+            401: components["responses"]["KeyRefused"];
+            403: components["responses"]["ScopeMissing"];
             /** @description There is no job of this id, or it is forgotten; with code `jobs_not_kept`: the service was started without `--data` */
             404: {
                 headers: {
@@ -2493,6 +2555,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            429: components["responses"]["QuotaExceeded"];
         };
     };
     jobReport: {
@@ -2515,6 +2578,8 @@ export interface operations {
                     "application/json": components["schemas"]["Report"];
                 };
             };
+            401: components["responses"]["KeyRefused"];
+            403: components["responses"]["ScopeMissing"];
             /** @description There is no job of this id, or it is forgotten; with code `jobs_not_kept`: the service was started without `--data` */
             404: {
                 headers: {
@@ -2542,6 +2607,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            429: components["responses"]["QuotaExceeded"];
         };
     };
     jobEvents: {
@@ -2574,6 +2640,8 @@ export interface operations {
                 };
                 content?: never;
             };
+            401: components["responses"]["KeyRefused"];
+            403: components["responses"]["ScopeMissing"];
             /** @description There is no job of this id, or it is forgotten; with code `jobs_not_kept`: the service was started without `--data` */
             404: {
                 headers: {
@@ -2583,6 +2651,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            429: components["responses"]["QuotaExceeded"];
         };
     };
     cancelJob: {
@@ -2605,6 +2674,8 @@ export interface operations {
                     "application/json": components["schemas"]["Job"];
                 };
             };
+            401: components["responses"]["KeyRefused"];
+            403: components["responses"]["ScopeMissing"];
             /** @description There is no job of this id, or it is forgotten; with code `jobs_not_kept`: the service was started without `--data` */
             404: {
                 headers: {
@@ -2623,6 +2694,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            429: components["responses"]["QuotaExceeded"];
         };
     };
     retryJob: {
@@ -2645,6 +2717,8 @@ export interface operations {
                     "application/json": components["schemas"]["Job"];
                 };
             };
+            401: components["responses"]["KeyRefused"];
+            403: components["responses"]["ScopeMissing"];
             /** @description There is no job of this id, or it is forgotten; with code `jobs_not_kept`: the service was started without `--data` */
             404: {
                 headers: {
@@ -2672,6 +2746,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            429: components["responses"]["QuotaExceeded"];
         };
     };
     info: {
@@ -2692,6 +2767,9 @@ export interface operations {
                     "application/json": components["schemas"]["Info"];
                 };
             };
+            401: components["responses"]["KeyRefused"];
+            403: components["responses"]["ScopeMissing"];
+            429: components["responses"]["QuotaExceeded"];
         };
     };
 }

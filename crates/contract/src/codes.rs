@@ -14,6 +14,8 @@ pub enum GrpcCode {
     DeadlineExceeded = 4,
     /// What is asked for is not there.
     NotFound = 5,
+    /// The caller is known and may not do this.
+    PermissionDenied = 7,
     /// A limit is reached.
     ResourceExhausted = 8,
     /// The request is right, but not for this scan.
@@ -26,6 +28,8 @@ pub enum GrpcCode {
     Internal = 13,
     /// Not now; try again.
     Unavailable = 14,
+    /// Nobody knows the caller.
+    Unauthenticated = 16,
 }
 
 /// A row of the table.
@@ -88,6 +92,19 @@ codes! {
     INVALID_CONSTRAINTS = "invalid_constraints", 422, InvalidArgument;
     /// A query that is valid with no scan.
     INVALID_QUERY = "invalid_query", 422, InvalidArgument;
+
+    // Keys.
+
+    /// The request carries no key, and this service wants one.
+    KEY_MISSING = "key_missing", 401, Unauthenticated;
+    /// The service does not know the request's key.
+    KEY_UNKNOWN = "key_unknown", 401, Unauthenticated;
+    /// The request's key has expired.
+    KEY_EXPIRED = "key_expired", 401, Unauthenticated;
+    /// The request's key does not have the scope that this takes.
+    INSUFFICIENT_SCOPE = "insufficient_scope", 403, PermissionDenied;
+    /// The request's key has used up one of its quotas.
+    QUOTA_EXCEEDED = "quota_exceeded", 429, ResourceExhausted;
 
     // Sessions.
 

@@ -17,18 +17,18 @@ use uuid::Uuid;
 
 use super::{
     ServeError,
-    client_address::ClientAddress,
+    client::{Caller, Client, Sharing},
     config::ServeArgs,
     connection_table::{ConnectionLimits, ConnectionTable},
     error::RequestError,
-    fair_queue::Client,
     kept_session::KeptSession,
+    keys::KeyRing,
     pace::PaceLimits,
     pool::{JobTurn, Pool},
     pool_task::{PoolError, TaskOrder},
     session_store::{SessionLimits, SessionStore},
     telemetry::Metrics,
-    uploads::{BodySize, Sharing, UploadRefusal, UploadSlot, Uploads},
+    uploads::{BodySize, UploadRefusal, UploadSlot, Uploads},
 };
 use darn_budget::{Budget, Limits, MemoryPool};
 use darn_contract::codes;
@@ -61,11 +61,13 @@ pub struct App {
     pub sessions: Arc<SessionStore>,
     /// The durable jobs; `None` without a data folder.
     pub jobs: Option<Arc<Jobs>>,
+    /// The keys; `None` where anybody may call.
+    pub keys: Option<Arc<KeyRing>>,
     /// Cancelled when the service begins to shut down.
     pub stopping: CancellationToken,
     pool: Pool,
     /// Whether clients are told apart by their address.
-    sharing: Sharing,
+    pub sharing: Sharing,
     /// The bodies being received.
     uploads: Uploads,
     mender: Arc<dyn Mender>,
@@ -87,13 +89,13 @@ pub struct UploadPermit {
 
 impl UploadPermit {
     /// Whom the request is from.
-    pub fn client(&self) -> Client {
-        self.client
+    pub fn client(&self) -> &Client {
+        &self.client
     }
 }
 
 /// The size of a request, by which its cost is estimated and limited.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 struct TaskSize {
     /// Whom it is for.
     client: Client,
@@ -172,6 +174,10 @@ impl App {
             }
             None => None,
         };
+        let keys = match &settings.keys {
+            Some(path) => Some(KeyRing::open(path).await?),
+            None => None,
+        };
         let metrics = Metrics::new().map_err(std::io::Error::other)?;
         let pool = Pool::start(settings.workers(), settings.queue, metrics.pool())?;
         let session_limits = SessionLimits {
@@ -204,10 +210,11 @@ impl App {
             editor: !settings.no_editor,
             sessions,
             jobs,
+            keys,
             stopping: CancellationToken::new(),
             pool,
             sharing,
-            uploads: Uploads::new(settings.uploads(), sharing),
+            uploads: Uploads::new(settings.uploads()),
             mender,
             warm: AtomicBool::new(false),
             draining: AtomicBool::new(false),
@@ -240,7 +247,7 @@ impl App {
         request: &Request,
         limit: usize,
     ) -> Result<UploadPermit, RequestError> {
-        let client = request.extensions().get::<ClientAddress>().copied();
+        let client = self.client(&Caller::of(request.extensions()));
         self.upload_permit_for(BodySize::of(request.body(), limit), client)
     }
 
@@ -251,10 +258,10 @@ impl App {
     pub(crate) fn upload_permit_for(
         &self,
         size: BodySize,
-        client: Option<ClientAddress>,
+        client: Client,
     ) -> Result<UploadPermit, RequestError> {
         let permit = self.upload_slot_for(size, client)?;
-        let capacity = self.pool.check_capacity(permit.client);
+        let capacity = self.pool.check_capacity(&permit.client);
         capacity.map_err(|error| of_pool(error, self.limits.deadline))?;
         Ok(permit)
     }
@@ -264,7 +271,7 @@ impl App {
     /// # Errors
     /// `UploadsFull`, `UploadShareFull` or `Draining`.
     pub fn job_upload_permit_of(&self, request: &Request) -> Result<UploadPermit, RequestError> {
-        let client = request.extensions().get::<ClientAddress>().copied();
+        let client = self.client(&Caller::of(request.extensions()));
         self.upload_slot_for(BodySize::of(request.body(), self.limits.body), client)
     }
 
@@ -272,9 +279,9 @@ impl App {
     fn upload_slot_for(
         &self,
         size: BodySize,
-        client: Option<ClientAddress>,
+        client: Client,
     ) -> Result<UploadPermit, RequestError> {
-        let permit = self.uploads.take(size, client);
+        let permit = self.uploads.take(size, &client);
         // Checked after the permit was taken: a drain waits for the permits taken before it.
         self.check_serving()?;
         let retry_after = self.limits.body_pause.as_secs().clamp(1, 60);
@@ -282,7 +289,6 @@ impl App {
             UploadRefusal::Full(limit) => RequestError::UploadsFull { limit, retry_after },
             UploadRefusal::ShareFull(held) => RequestError::UploadShareFull { held, retry_after },
         })?;
-        let client = client.filter(|_| self.sharing == Sharing::ByAddress);
         Ok(UploadPermit { client, slot })
     }
 
@@ -323,7 +329,7 @@ impl App {
     ) -> Result<T, RequestError> {
         let deadline = Deadline::after(self.limits.deadline);
         let size = TaskSize {
-            client: upload.client,
+            client: upload.client.clone(),
             bytes,
         };
         self.run_task(Some(upload), size, deadline, job).await
@@ -342,11 +348,11 @@ impl App {
         job: impl FnOnce(&KeptSession, &Budget<'_>) -> Result<T, Refusal> + Send + 'static,
     ) -> Result<T, RequestError> {
         let deadline = Deadline::after(self.limits.deadline);
-        let lease = self.sessions.lease(id, std::time::Instant::now())?;
+        let lease = (self.sessions).lease(id, &upload.client, std::time::Instant::now())?;
         let guard = timeout_at(deadline.at, lease.exclusive()).await;
         let guard = guard.map_err(|_| of_pool(PoolError::Expired, deadline.length))?;
         let size = TaskSize {
-            client: upload.client,
+            client: upload.client.clone(),
             bytes: guard.scan_bytes(),
         };
         self.run_task(Some(upload), size, deadline, move |_, budget| {

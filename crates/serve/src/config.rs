@@ -34,6 +34,14 @@ pub struct ServeArgs {
     #[arg(long, env = "DARN_GRPC_LISTEN", value_name = "ADDRESS")]
     pub grpc_listen: Option<SocketAddr>,
 
+    /// File of the keys that the service takes; read again when it changes. `darn key new` makes keys. Left out, anybody may call
+    #[arg(long, env = "DARN_KEYS", value_name = "FILE")]
+    pub keys: Option<PathBuf>,
+
+    /// Listen beyond this machine's loopback without keys: whoever reaches the address may call
+    #[arg(long, env = "DARN_ALLOW_ANONYMOUS", conflicts_with = "keys")]
+    pub allow_anonymous: bool,
+
     /// Folder in which jobs are kept, which survive the process; left out, the service takes no jobs
     #[arg(long, env = "DARN_DATA", value_name = "DIR")]
     pub data: Option<PathBuf>,
@@ -135,6 +143,15 @@ pub struct ServeArgs {
 }
 
 impl ServeArgs {
+    /// The first address that strangers might reach and that no key guards; `None` where that is allowed.
+    pub(crate) fn exposed(&self) -> Option<SocketAddr> {
+        if self.keys.is_some() || self.allow_anonymous {
+            return None;
+        }
+        let mut addresses = [Some(self.listen), self.grpc_listen].into_iter().flatten();
+        addresses.find(|address| !address.ip().to_canonical().is_loopback())
+    }
+
     /// Worker threads. Without a setting two per processor, since a worker waits while the shared threads do its parallel work.
     pub fn workers(&self) -> usize {
         self.workers.unwrap_or_else(|| {
@@ -365,6 +382,28 @@ mod tests {
                 "{bad:?}"
             );
         }
+    }
+
+    #[test]
+    fn an_address_beyond_loopback_needs_keys_or_a_decision() {
+        let exposed = |options: &[&str]| {
+            let settings = Command::try_parse_from([&["darn"], options].concat());
+            settings.unwrap().serve.exposed().map(|it| it.to_string())
+        };
+        for guarded in [
+            &["--listen", "127.0.0.2:80"][..],
+            &["--listen", "[::1]:80"],
+            &["--listen", "[::ffff:127.0.0.1]:80"],
+            &["--listen", "0.0.0.0:80", "--allow-anonymous"],
+            &["--listen", "[::]:80", "--keys", "keys.json"],
+        ] {
+            assert_eq!(exposed(guarded), None, "{guarded:?}");
+        }
+        for (listen, grpc) in [("0.0.0.0:80", "127.0.0.1:81"), ("127.0.0.1:81", "[::]:80")] {
+            assert!(exposed(&["--listen", listen, "--grpc-listen", grpc]).is_some());
+        }
+        let both = ["darn", "--keys", "keys.json", "--allow-anonymous"];
+        assert!(Command::try_parse_from(both).is_err());
     }
 
     #[test]

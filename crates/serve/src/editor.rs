@@ -45,6 +45,11 @@ pub fn routes() -> Router<Arc<App>> {
     })
 }
 
+/// Whether a path is that of a file of the editor.
+pub fn has_file(path: &str) -> bool {
+    FILES.iter().any(|file| file.path == path)
+}
+
 /// A file, compressed where the client takes that, or 304 where the client has it.
 fn answer(file: &'static EditorFile, request: &HeaderMap) -> Response {
     let compressed = takes_gzip(request);

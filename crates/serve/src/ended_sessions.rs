@@ -7,6 +7,8 @@ use std::{
 
 use uuid::Uuid;
 
+use super::client::Client;
+
 /// Most ended sessions remembered; about 4 MB.
 const MAX_REMEMBERED: usize = 1 << 16;
 
@@ -17,7 +19,7 @@ pub enum EndReason {
     Idle,
     /// Its memory was needed for others.
     Evicted,
-    /// Its owner deleted it.
+    /// Its client deleted it.
     Deleted,
 }
 
@@ -31,31 +33,40 @@ impl fmt::Display for EndReason {
     }
 }
 
+/// The end of a session.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct End {
+    /// Why it ended.
+    pub reason: EndReason,
+    /// Who had opened it.
+    pub client: Client,
+}
+
 /// The sessions that ended last.
 #[derive(Debug, Default)]
 pub struct EndedSessions {
-    reasons: HashMap<Uuid, EndReason>,
+    ends: HashMap<Uuid, End>,
     /// Oldest first.
     order: VecDeque<Uuid>,
 }
 
 impl EndedSessions {
     /// Remembers an end, and forgets the oldest one when there are too many.
-    pub fn record(&mut self, id: Uuid, reason: EndReason) {
-        if self.reasons.insert(id, reason).is_some() {
+    pub fn record(&mut self, id: Uuid, end: End) {
+        if self.ends.insert(id, end).is_some() {
             return;
         }
         self.order.push_back(id);
         if self.order.len() > MAX_REMEMBERED
             && let Some(oldest) = self.order.pop_front()
         {
-            self.reasons.remove(&oldest);
+            self.ends.remove(&oldest);
         }
     }
 
-    /// Why a session ended, if that is remembered.
-    pub fn reason(&self, id: &Uuid) -> Option<EndReason> {
-        self.reasons.get(id).copied()
+    /// How a session ended, if that is remembered.
+    pub fn end(&self, id: &Uuid) -> Option<&End> {
+        self.ends.get(id)
     }
 }
 
@@ -69,13 +80,17 @@ mod tests {
         let ids: Vec<Uuid> = (0..MAX_REMEMBERED as u128 + 2)
             .map(Uuid::from_u128)
             .collect();
+        let end = End {
+            reason: EndReason::Idle,
+            client: None,
+        };
         for id in &ids {
-            ended.record(*id, EndReason::Idle);
+            ended.record(*id, end.clone());
         }
-        assert_eq!(ended.reason(&ids[0]), None);
-        assert_eq!(ended.reason(&ids[1]), None);
-        assert_eq!(ended.reason(&ids[2]), Some(EndReason::Idle));
+        assert_eq!(ended.end(&ids[0]), None);
+        assert_eq!(ended.end(&ids[1]), None);
+        assert_eq!(ended.end(&ids[2]), Some(&end));
         assert_eq!(ended.order.len(), MAX_REMEMBERED);
-        assert_eq!(ended.reasons.len(), MAX_REMEMBERED);
+        assert_eq!(ended.ends.len(), MAX_REMEMBERED);
     }
 }

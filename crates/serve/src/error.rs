@@ -6,7 +6,9 @@ use darn_jobs::{JobError, State};
 use tracing::error;
 use uuid::Uuid;
 
-use super::{ended_sessions::EndReason, session_store::SessionError};
+use super::{
+    ended_sessions::EndReason, key_file::Scope, quota::Exceeded, session_store::SessionError,
+};
 
 /// Why a request was not answered.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -37,6 +39,26 @@ pub enum RequestError {
     /// The path has other methods.
     #[error("this path does not take this method; the header `allow` lists those it takes")]
     MethodNotAllowed,
+    /// The request carries no key.
+    #[error("this service takes a key: send the header `authorization: Bearer KEY`")]
+    KeyMissing,
+    /// The request's key is not known.
+    #[error("this service does not know the key in the header `authorization`")]
+    KeyUnknown,
+    /// The request's key has expired.
+    #[error("the key in the header `authorization` has expired")]
+    KeyExpired,
+    /// The request's key may not do this.
+    #[error(
+        "the key in the header `authorization` does not have the scope `{scope}`, which this takes"
+    )]
+    InsufficientScope {
+        /// What it would have to have.
+        scope: Scope,
+    },
+    /// The request's key has used up a quota.
+    #[error(transparent)]
+    Quota(Exceeded),
     /// The body came too slowly.
     #[error(
         "the body came too slowly: no pause may last longer than {seconds} s (DARN_BODY_TIMEOUT), and the whole no longer than {whole} s; over longer than a pause at least {rate} bytes a second must come (DARN_BODY_RATE)"
@@ -163,12 +185,12 @@ pub enum RequestError {
         /// Suggested seconds to wait.
         retry_after: u64,
     },
-    /// Too many bodies are being received from one address.
+    /// Too many bodies are being received from one client.
     #[error(
-        "{held} requests are being received from this address, and one address may not take more than it leaves free (DARN_UPLOADS); try again in {retry_after} s"
+        "{held} requests are being received from this client, and one client may not take more than it leaves free (DARN_UPLOADS); try again in {retry_after} s"
     )]
     UploadShareFull {
-        /// Bodies being received from this address.
+        /// Bodies being received from this client.
         held: usize,
         /// Suggested seconds to wait.
         retry_after: u64,
@@ -240,6 +262,11 @@ impl RequestError {
             Self::Malformed(_) => codes::MALFORMED_REQUEST,
             Self::NotFound => codes::NOT_FOUND,
             Self::MethodNotAllowed => codes::METHOD_NOT_ALLOWED,
+            Self::KeyMissing => codes::KEY_MISSING,
+            Self::KeyUnknown => codes::KEY_UNKNOWN,
+            Self::KeyExpired => codes::KEY_EXPIRED,
+            Self::InsufficientScope { .. } => codes::INSUFFICIENT_SCOPE,
+            Self::Quota(_) => codes::QUOTA_EXCEEDED,
             Self::BodyTimeout { .. } => codes::BODY_TIMEOUT,
             Self::TooLarge { .. } => codes::BODY_TOO_LARGE,
             Self::MessageTooLarge { .. } => codes::MESSAGE_TOO_LARGE,
@@ -260,6 +287,7 @@ impl RequestError {
                 SessionError::Ended(EndReason::Idle) => codes::SESSION_EXPIRED,
                 SessionError::Ended(EndReason::Evicted) => codes::SESSION_EVICTED,
                 SessionError::Ended(EndReason::Deleted) => codes::SESSION_DELETED,
+                SessionError::Quota(_) => codes::QUOTA_EXCEEDED,
                 SessionError::Busy { .. } => codes::SESSION_BUSY,
                 SessionError::TooLarge { .. } => codes::SESSION_TOO_LARGE,
                 SessionError::Full { .. } => codes::SESSIONS_FULL,
@@ -281,6 +309,14 @@ impl RequestError {
         }
     }
 
+    /// The quota that left no room for the request.
+    pub fn exceeded(&self) -> Option<&Exceeded> {
+        match self {
+            Self::Quota(exceeded) | Self::Session(SessionError::Quota(exceeded)) => Some(exceeded),
+            _ => None,
+        }
+    }
+
     /// The fields of the constraints or the query at fault.
     pub fn fields(&self) -> &[FieldError] {
         match self {
@@ -296,6 +332,9 @@ impl RequestError {
             Self::QueueFull { retry_after, .. }
             | Self::UploadsFull { retry_after, .. }
             | Self::UploadShareFull { retry_after, .. } => Some(*retry_after),
+            Self::Quota(exceeded) | Self::Session(SessionError::Quota(exceeded)) => {
+                exceeded.retry_after
+            }
             Self::Draining
             | Self::WarmingUp
             | Self::MemoryFull { .. }

@@ -7,10 +7,7 @@
 
 use std::collections::HashMap;
 
-use super::client_address::ClientAddress;
-
-/// Whom a job is for. Jobs without an address share one place among the clients.
-pub type Client = Option<ClientAddress>;
+use super::client::Client;
 
 /// Waiting jobs, and what their clients have running.
 #[derive(Debug)]
@@ -50,7 +47,7 @@ pub(crate) enum JobClass {
 }
 
 /// A job that has started; to be given back to [`FairQueue::ended`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Started {
     client: Client,
     class: JobClass,
@@ -91,7 +88,7 @@ impl<T> FairQueue<T> {
 
     /// Adds a job that is estimated to cost this much.
     pub(crate) fn push(&mut self, client: Client, cost: u64, job: T) {
-        let load = self.loads.entry(client).or_default();
+        let load = self.loads.entry(client.clone()).or_default();
         load.waiting += 1;
         let jobs = (load.waiting + load.running) as u64;
         self.waiting.push(Waiting {
@@ -151,7 +148,7 @@ impl<T> FairQueue<T> {
             load.running -= 1;
             load.large_running -= large;
         }
-        self.forget_idle(client);
+        self.forget_idle(&client);
     }
 
     /// Takes out the jobs that are not wanted any more.
@@ -165,15 +162,15 @@ impl<T> FairQueue<T> {
             if let Some(load) = self.loads.get_mut(&client) {
                 load.waiting -= 1;
             }
-            self.forget_idle(client);
+            self.forget_idle(&client);
             jobs.push(job);
         }
         jobs
     }
 
-    fn forget_idle(&mut self, client: Client) {
-        if (self.loads.get(&client)).is_some_and(|load| load.waiting + load.running == 0) {
-            self.loads.remove(&client);
+    fn forget_idle(&mut self, client: &Client) {
+        if (self.loads.get(client)).is_some_and(|load| load.waiting + load.running == 0) {
+            self.loads.remove(client);
         }
     }
 }
@@ -185,9 +182,11 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::{client::ClientId, client_address::ClientAddress};
 
     fn client(n: u8) -> Client {
-        Some(ClientAddress::of(Ipv4Addr::new(192, 0, 2, n).into()))
+        let address = ClientAddress::of(Ipv4Addr::new(192, 0, 2, n).into());
+        Some(ClientId::Address(address))
     }
 
     /// The jobs in the order in which one worker starts them.
@@ -249,7 +248,7 @@ mod tests {
         assert_eq!(queue.pop(), None);
         queue.ended(other);
         assert_eq!(queue.pop(), None);
-        queue.ended(started[0]);
+        queue.ended(started.remove(0));
         assert!(queue.pop().is_some());
     }
 

@@ -13,7 +13,7 @@ use super::generated::darn_server::{Darn, DarnServer};
 use super::{
     app::App,
     body::{BodyTimer, ScanRequest},
-    client_address::ClientAddress,
+    client::Caller,
     counted::CountedBytes,
     error::RequestError,
     parameters::Parameters,
@@ -166,7 +166,7 @@ impl GrpcService {
         &self,
         request: Request<Streaming<ScanChunk>>,
     ) -> Result<ScanRequest<P>, RequestError> {
-        let client = request.extensions().get::<ClientAddress>().copied();
+        let client = self.0.client(&Caller::of(request.extensions()));
         let mut stream = request.into_inner();
         let upload = self.0.upload_permit_for(BodySize::Large, client)?;
         let limit = self.0.limits.body;

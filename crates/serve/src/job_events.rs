@@ -16,9 +16,11 @@ use bytes::Bytes;
 use darn_jobs::{Job, Jobs};
 use hyper::body::Frame;
 use tokio::{select, sync::mpsc, time::sleep};
-use tokio_util::sync::CancellationToken;
 
-use super::{answer::LiveAnswer, job_message::message, media_types::EVENT_STREAM, response};
+use super::{
+    answer::LiveAnswer, app::App, client::Caller, job_message::message, media_types::EVENT_STREAM,
+    response,
+};
 
 /// The version that a client has seen last; browsers send it when they connect again.
 pub const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
@@ -30,28 +32,32 @@ const COMMENT_EVERY: Duration = Duration::from_secs(15);
 /// Events that wait for a client that reads slowly; then the changes wait.
 const EVENTS_AHEAD: usize = 4;
 
-/// The events of a job from its present state on, until it is finished or deleted or the service stops. Nothing (204, after which a browser does
-/// not connect again) for a client that has seen the job finished.
-pub fn answer(
-    jobs: &Arc<Jobs>,
-    job: Job,
-    headers: &HeaderMap,
-    stopping: CancellationToken,
-) -> Response {
+/// Who listens to the events of a job.
+pub struct Listener {
+    /// The service.
+    pub app: Arc<App>,
+    /// Its jobs.
+    pub jobs: Arc<Jobs>,
+    /// Whoever asked for them.
+    pub caller: Caller,
+}
+
+/// The events of a job from its present state on, until it is finished or deleted, the service stops, or the caller's key is no longer taken.
+/// Nothing (204, after which a browser does not connect again) for a client that has seen the job finished.
+pub fn answer(listener: Listener, job: Job, headers: &HeaderMap) -> Response {
     let seen = headers.get(LAST_EVENT_ID);
     let seen = seen.and_then(|id| id.to_str().ok()?.trim().parse::<i64>().ok());
     if job.state.is_finished() && seen == Some(job.version) {
         return StatusCode::NO_CONTENT.into_response();
     }
     let (events, received) = mpsc::channel(EVENTS_AHEAD);
-    let jobs = Arc::clone(jobs);
     tokio::spawn(async move {
         // Versions start at 1: whoever has seen none is told the present one.
-        let told = tell(&jobs, job, seen.unwrap_or(0), &events);
+        let told = tell(&listener, job, seen.unwrap_or(0), &events);
         select! {
             () = told => {}
             () = events.closed() => {}
-            () = stopping.cancelled() => {}
+            () = listener.app.stopping.cancelled() => {}
         }
     });
     let headers = [
@@ -64,12 +70,19 @@ pub fn answer(
     answer
 }
 
-async fn tell(jobs: &Jobs, job: Job, mut seen: i64, events: &mpsc::Sender<Bytes>) {
+async fn tell(listener: &Listener, job: Job, mut seen: i64, events: &mpsc::Sender<Bytes>) {
     let id = job.id;
     loop {
-        let text = select! {
-            () = sleep(COMMENT_EVERY) => Bytes::from_static(b":\n\n"),
-            job = jobs.changed_since(id, seen) => {
+        let changed = select! {
+            () = sleep(COMMENT_EVERY) => None,
+            job = listener.jobs.changed_since(id, seen) => Some(job),
+        };
+        if !listener.app.still_takes(&listener.caller) {
+            return;
+        }
+        let text = match changed {
+            None => Bytes::from_static(b":\n\n"),
+            Some(job) => {
                 // Deleted, or the database failed: the client asks again and is told.
                 let Ok(job) = job else {
                     return;

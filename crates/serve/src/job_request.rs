@@ -5,8 +5,8 @@ use darn_jobs::Submission;
 use serde::{Deserialize, Serialize};
 
 use super::{
+    client::{Client, ClientId},
     error::{ParameterKind, RequestError},
-    fair_queue::Client,
     parameters::Parameters,
     response,
 };
@@ -152,9 +152,9 @@ impl JobLabels {
     }
 
     /// A submission of a client.
-    pub fn submission(self, client: Client, request: &JobRequest) -> Submission {
+    pub fn submission(self, client: &Client, request: &JobRequest) -> Submission {
         Submission {
-            client: client.map_or_else(String::new, |address| address.0.to_string()),
+            client: client.as_ref().map_or_else(String::new, ClientId::text),
             idempotency_key: self.key,
             name: self.name,
             priority: self.priority,

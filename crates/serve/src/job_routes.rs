@@ -19,10 +19,14 @@ use uuid::Uuid;
 use super::{
     app::App,
     body::{self, ScanRequest},
+    client::Caller,
     error::RequestError,
-    job_answer, job_events,
+    job_answer,
+    job_events::{self, Listener},
     job_message::{message, problem_document},
+    job_quota,
     job_request::{JobLabels, JobRequest, KeptConstraints},
+    key_file::Scope,
     media_types::{JSON, PROBLEM_JSON},
     prefer::{PREFERENCE_APPLIED, Preferences},
     response,
@@ -58,25 +62,37 @@ impl FromRequestParts<Arc<App>> for KeptJobs {
     }
 }
 
-/// The job id in a path.
-struct JobId(Uuid);
+/// The job of the id in a path, which the caller may see: for all others it does not exist.
+struct KnownJob {
+    jobs: Arc<Jobs>,
+    job: Job,
+}
 
-impl<S: Send + Sync> FromRequestParts<S> for JobId {
+impl FromRequestParts<Arc<App>> for KnownJob {
     type Rejection = RequestError;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, RequestError> {
+    async fn from_request_parts(parts: &mut Parts, app: &Arc<App>) -> Result<Self, RequestError> {
+        let KeptJobs(jobs) = KeptJobs::from_request_parts(parts, app).await?;
         // A text that is not an id is an unknown job.
-        let Ok(Path(text)) = Path::<String>::from_request_parts(parts, state).await else {
+        let Ok(Path(text)) = Path::<String>::from_request_parts(parts, app).await else {
             return Err(RequestError::NoSuchJob);
         };
         let id = Uuid::try_parse(&text).map_err(|_| RequestError::NoSuchJob)?;
-        Ok(Self(id))
+        let job = jobs.get(id).await?;
+        if Caller::of(&parts.extensions).sees(&job) {
+            Ok(Self { jobs, job })
+        } else {
+            Err(RequestError::NoSuchJob)
+        }
     }
 }
 
 async fn submit(State(app): State<Arc<App>>, request: Request) -> Result<Response, RequestError> {
     let labels = JobLabels::of(request.headers(), request.uri().query());
-    let jobs = app.jobs.as_ref().ok_or(RequestError::JobsNotKept);
+    let jobs = match Caller::of(request.extensions()).may_hand_over() {
+        true => app.jobs.as_ref().ok_or(RequestError::JobsNotKept),
+        false => Err(RequestError::InsufficientScope { scope: Scope::Jobs }),
+    };
     let job = match (jobs, labels) {
         (Ok(jobs), Ok(labels)) => hand_over(&app, jobs, request, labels).await?,
         (Err(error), _) | (_, Err(error)) => {
@@ -132,6 +148,11 @@ async fn hand_over(
     labels: JobLabels,
 ) -> Result<Job, RequestError> {
     let headers = request.headers().clone();
+    let caller = Caller::of(request.extensions());
+    if let Err(error) = job_quota::check(jobs, &caller).await {
+        body::discard(request, &app.limits);
+        return Err(error);
+    }
     let ScanRequest {
         scan,
         files,
@@ -140,7 +161,9 @@ async fn hand_over(
     } = body::receive_job_scan::<KeptConstraints>(app, request).await?;
     let asked = JobRequest::new(parameters, files.answer(&headers).form);
     let submission = labels.submission(upload.client(), &asked);
+    let turn = job_quota::turn(jobs, &caller).await?;
     let job = jobs.submit(submission, &scan[..]).await?.into_job();
+    drop(turn);
     drop(upload);
     Ok(job)
 }
@@ -188,8 +211,16 @@ fn failed(job: &Job, request: Option<RequestId>) -> Response {
     (status, headers, response::json(&document)).into_response()
 }
 
-async fn list(KeptJobs(jobs): KeptJobs, uri: Uri) -> Result<Response, RequestError> {
-    let page = jobs.list(&list_query(uri.query())?).await?;
+async fn list(
+    KeptJobs(jobs): KeptJobs,
+    caller: Caller,
+    uri: Uri,
+) -> Result<Response, RequestError> {
+    let query = ListQuery {
+        client: caller.only_jobs_of().map(ToString::to_string),
+        ..list_query(uri.query())?
+    };
+    let page = jobs.list(&query).await?;
     Ok(response::json_response(response::json(&v1::JobList {
         jobs: page.jobs.iter().map(message).collect(),
         next: page.next.map(|number| number.to_string()),
@@ -238,44 +269,42 @@ fn list_query(query: Option<&str>) -> Result<ListQuery, RequestError> {
     Ok(wanted)
 }
 
-async fn describe(KeptJobs(jobs): KeptJobs, JobId(id): JobId) -> Result<Response, RequestError> {
-    Ok(described(&jobs.get(id).await?))
+async fn describe(known: KnownJob) -> Response {
+    described(&known.job)
 }
 
 async fn result(
     State(app): State<Arc<App>>,
-    KeptJobs(jobs): KeptJobs,
-    JobId(id): JobId,
+    KnownJob { jobs, job }: KnownJob,
     headers: HeaderMap,
 ) -> Result<Response, RequestError> {
-    job_answer::result(&app, &jobs, id, &headers).await
+    job_answer::result(&app, &jobs, job.id, &headers).await
 }
 
-async fn report(KeptJobs(jobs): KeptJobs, JobId(id): JobId) -> Result<Response, RequestError> {
-    job_answer::report(&jobs, id).await
+async fn report(KnownJob { jobs, job }: KnownJob) -> Result<Response, RequestError> {
+    job_answer::report(&jobs, job.id).await
 }
 
 async fn events(
     State(app): State<Arc<App>>,
-    KeptJobs(jobs): KeptJobs,
-    JobId(id): JobId,
+    KnownJob { jobs, job }: KnownJob,
+    caller: Caller,
     headers: HeaderMap,
-) -> Result<Response, RequestError> {
-    let job = jobs.get(id).await?;
-    let stopping = app.stopping.clone();
-    Ok(job_events::answer(&jobs, job, &headers, stopping))
+) -> Response {
+    job_events::answer(Listener { app, jobs, caller }, job, &headers)
 }
 
-async fn cancel(KeptJobs(jobs): KeptJobs, JobId(id): JobId) -> Result<Response, RequestError> {
-    Ok(described(&jobs.cancel(id).await?))
+async fn cancel(KnownJob { jobs, job }: KnownJob) -> Result<Response, RequestError> {
+    Ok(described(&jobs.cancel(job.id).await?))
 }
 
-async fn retry(KeptJobs(jobs): KeptJobs, JobId(id): JobId) -> Result<Response, RequestError> {
-    Ok(described(&jobs.retry(id).await?))
+async fn retry(KnownJob { jobs, job }: KnownJob, caller: Caller) -> Result<Response, RequestError> {
+    let _turn = job_quota::turn(&jobs, &caller).await?;
+    Ok(described(&jobs.retry(job.id).await?))
 }
 
-async fn delete(KeptJobs(jobs): KeptJobs, JobId(id): JobId) -> Result<StatusCode, RequestError> {
-    jobs.delete(id).await?;
+async fn delete(KnownJob { jobs, job }: KnownJob) -> Result<StatusCode, RequestError> {
+    jobs.delete(job.id).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

@@ -109,8 +109,10 @@ impl JobWorker {
                 if self.stop.is_cancelled() {
                     return None;
                 }
+                let keys = self.app.keys.as_ref();
+                let limits = keys.map(|keys| keys.running_limits()).unwrap_or_default();
                 // Not in a `select`: a claim is never dropped, so that the database is open until it has ended.
-                match self.jobs.claim(&self.name).await {
+                match self.jobs.claim_within(&self.name, &limits).await {
                     Ok(Some(claimed)) => return Some((claimed, turn)),
                     Ok(None) => {}
                     Err(error) => warn!(?error, "no job can be claimed"),

@@ -8,7 +8,9 @@
 mod accept;
 mod answer;
 mod app;
+mod authorization;
 mod body;
+mod client;
 mod client_address;
 mod config;
 mod connection_table;
@@ -30,11 +32,14 @@ mod healthcheck;
 mod job_answer;
 mod job_events;
 mod job_message;
+mod job_quota;
 mod job_request;
 mod job_routes;
 mod job_worker;
-
 mod kept_session;
+mod key_file;
+mod key_secret;
+mod keys;
 mod log_queue;
 mod media_types;
 pub mod openapi;
@@ -44,6 +49,8 @@ mod pool;
 mod pool_task;
 mod prefer;
 mod problem;
+mod quota;
+mod quota_check;
 mod request_body;
 mod response;
 mod routes;
@@ -77,6 +84,9 @@ pub use self::{
     app::App,
     config::{ServeArgs, duration},
     healthcheck::{HealthError, healthcheck},
+    key_file::{EntryDigest, Expiry, KeyEntry, KeyId, Scope},
+    key_secret::{Secret, SecretDigest},
+    keys::KeyFileError,
     log_queue::{LogGuard, write_to_stderr},
     telemetry::{LogDelivery, LogError, LogFormat, start_logging},
 };
@@ -120,6 +130,17 @@ pub enum ServeError {
         /// Why not.
         source: darn_jobs::JobError,
     },
+    /// Strangers might call.
+    #[error(
+        "{address} can be reached from other machines, and whoever reaches it could use this service: give it keys (--keys FILE, DARN_KEYS; `darn key new` makes one), or say that anybody may call (--allow-anonymous, DARN_ALLOW_ANONYMOUS=true)"
+    )]
+    Exposed {
+        /// The address of the settings.
+        address: SocketAddr,
+    },
+    /// The file of the keys cannot be used.
+    #[error(transparent)]
+    Keys(#[from] KeyFileError),
     /// The warm-up mend failed, so no request could succeed.
     #[error("the warm-up mend failed: {0}")]
     WarmUp(String),
@@ -128,8 +149,12 @@ pub enum ServeError {
 /// Serves until SIGTERM or SIGINT, or until something fails; blocks. Must not be called from an async runtime.
 ///
 /// # Errors
-/// An address that cannot be bound, a failed warm-up, or an I/O error; see [`ServeError`].
+/// An address that cannot be bound or that no key guards, a file of keys that is not valid, a failed warm-up, or an I/O error; see
+/// [`ServeError`].
 pub fn run(settings: &ServeArgs, mender: Arc<dyn Mender>) -> Result<(), ServeError> {
+    if let Some(address) = settings.exposed() {
+        return Err(ServeError::Exposed { address });
+    }
     let async_threads = thread::available_parallelism().map_or(1, NonZero::get);
     // One more for what blocks: the runtime starts others only if it can.
     let count = async_threads + settings.workers() + 1;
@@ -207,6 +232,7 @@ pub async fn serve(
         listeners.spawn(listen(sockets.http, router(&app)));
     }
     let upkeep = tokio::spawn(upkeep(Arc::clone(&app)));
+    let watching = (app.keys.clone()).map(|keys| tokio::spawn(keys.watch()));
     let drained = tokio::spawn({
         let (app, stop) = (Arc::clone(&app), stop.clone());
         async move {
@@ -258,6 +284,9 @@ pub async fn serve(
     }
     upkeep.abort();
     drained.abort();
+    if let Some(watching) = watching {
+        watching.abort();
+    }
     if warm_up.is_finished() {
         if let Ok(Err(error)) = warm_up.await {
             return Err(ServeError::WarmUp(error.to_string()));

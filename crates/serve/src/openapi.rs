@@ -15,6 +15,7 @@ use super::{
 };
 
 mod jobs;
+mod keys;
 mod sessions;
 
 /// The document's text, as served at `/openapi.json`.
@@ -31,7 +32,7 @@ pub fn document() -> Value {
     schemas.insert("Problem".to_owned(), problem_schema());
     schemas.insert("ProblemCode".to_owned(), problem_codes());
     schemas.insert("Info".to_owned(), info_schema());
-    json!({
+    let mut document = json!({
         "openapi": "3.1.0",
         "info": {
             "title": "darn",
@@ -71,8 +72,10 @@ pub fn document() -> Value {
                 "responses": { "200": { "description": "The document", "content": { JSON: {} } } },
             } },
         },
-        "components": { "schemas": schemas },
-    })
+        "components": { "schemas": schemas, "responses": keys::answers(), "securitySchemes": keys::schemes() },
+    });
+    keys::add(&mut document["paths"]);
+    document
 }
 
 fn inpaint() -> Value {
@@ -341,6 +344,27 @@ fn info_schema() -> Value {
                     "sessionIdleSeconds": { "type": "number", "description": "A session ends after so long without a request" },
                 },
                 "required": ["bodyBytes", "deadlineSeconds", "sessionIdleSeconds"],
+            },
+            "key": {
+                "type": "object",
+                "description": "The key that came with the request; absent where the service takes no keys",
+                "properties": {
+                    "id": { "type": "string" },
+                    "scopes": { "type": "array", "items": { "type": "string", "enum": ["mend", "jobs", "metrics", "admin"] } },
+                    "limits": {
+                        "type": "object",
+                        "description": "What the key may take; nothing bounds what is left out",
+                        "properties": {
+                            "requestsPerMinute": { "type": "integer" },
+                            "bytesPerDay": { "type": "integer" },
+                            "waitingJobs": { "type": "integer" },
+                            "runningJobs": { "type": "integer" },
+                            "sessions": { "type": "integer" },
+                        },
+                    },
+                    "expires": { "type": "string", "format": "date-time" },
+                },
+                "required": ["id", "scopes", "limits"],
             },
         },
         "required": ["version", "jobs", "limits"],

@@ -21,7 +21,8 @@ use tokio::{
 use tracing::Span;
 
 use super::{
-    fair_queue::{Client, FairQueue, Started},
+    client::Client,
+    fair_queue::{FairQueue, Started},
     pool_task::{PoolError, PoolTask, QueuedTask, TaskOrder},
     telemetry::PoolMetrics,
 };
@@ -164,7 +165,7 @@ impl Pool {
     ///
     /// # Errors
     /// `Full` with an estimate, or `Closed`.
-    pub fn check_capacity(&self, client: Client) -> Result<(), PoolError> {
+    pub fn check_capacity(&self, client: &Client) -> Result<(), PoolError> {
         self.0.with_place(client, |_| ())
     }
 
@@ -173,9 +174,9 @@ impl Pool {
     /// # Errors
     /// `Full` with an estimate, or `Closed`.
     pub fn reserve(&self, client: Client) -> Result<QueuePermit, PoolError> {
-        self.0.with_place(client, |queue| {
+        self.0.with_place(&client, |queue| {
             queue.taken += 1;
-            *queue.taken_by.entry(client).or_default() += 1;
+            *queue.taken_by.entry(client.clone()).or_default() += 1;
         })?;
         self.0.places_changed.notify_one();
         Ok(QueuePermit {
@@ -195,7 +196,7 @@ impl Pool {
         order: TaskOrder,
         work: impl FnOnce(&Budget<'_>) -> T + Send + 'static,
     ) -> impl Future<Output = Result<T, PoolError>> {
-        let client = permit.client;
+        let client = permit.client.clone();
         self.queue(client, permit, order, work)
     }
 
@@ -294,9 +295,9 @@ impl Shared {
     }
 
     /// Calls `take` if a place is free for a client; drops the jobs of callers who left if there is none.
-    fn with_place(&self, client: Client, take: impl FnOnce(&mut Queue)) -> Result<(), PoolError> {
+    fn with_place(&self, client: &Client, take: impl FnOnce(&mut Queue)) -> Result<(), PoolError> {
         let is_free = |queue: &Queue| {
-            let taken_by = queue.taken_by.get(&client).copied().unwrap_or_default();
+            let taken_by = queue.taken_by.get(client).copied().unwrap_or_default();
             queue.taken < self.places && taken_by < self.places_per_client
         };
         if !is_free(&self.lock()) {

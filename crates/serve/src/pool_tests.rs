@@ -5,8 +5,8 @@ use std::sync::mpsc;
 use darn_budget::Limits;
 
 use super::*;
-use crate::client_address::ClientAddress;
 use crate::telemetry::Metrics;
+use crate::{client::ClientId, client_address::ClientAddress};
 
 fn pool(workers: usize, queue: usize) -> Pool {
     Pool::start(workers, queue, Metrics::new().unwrap().pool()).unwrap()
@@ -220,14 +220,13 @@ async fn poll_once<F: Future + Unpin>(future: &mut F) -> Option<F::Output> {
 async fn one_client_cannot_take_every_place() {
     let pool = pool(1, 7);
     let client = |n: u8| {
-        Some(ClientAddress::of(
-            std::net::Ipv4Addr::new(192, 0, 2, n).into(),
-        ))
+        let address = std::net::Ipv4Addr::new(192, 0, 2, n).into();
+        Some(ClientId::Address(ClientAddress::of(address)))
     };
     let flood: Vec<_> = (0..8).map_while(|_| pool.reserve(client(1)).ok()).collect();
     assert_eq!(flood.len(), 6);
-    assert!(pool.check_capacity(client(1)).is_err());
-    assert!(pool.check_capacity(client(2)).is_ok());
+    assert!(pool.check_capacity(&client(1)).is_err());
+    assert!(pool.check_capacity(&client(2)).is_ok());
     let others: Vec<_> = (0..8).map_while(|_| pool.reserve(client(2)).ok()).collect();
     assert_eq!(others.len(), 2);
     drop(flood);

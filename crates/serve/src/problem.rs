@@ -54,6 +54,9 @@ impl RequestError {
         if let Some(seconds) = self.retry_after() {
             headers.insert(header::RETRY_AFTER, HeaderValue::from(seconds));
         }
+        if let Some(challenge) = self.challenge() {
+            headers.insert(header::WWW_AUTHENTICATE, challenge);
+        }
         if matches!(self, Self::ContentEncoding { .. }) {
             // RFC 7694: the encodings that are read.
             headers.insert(
@@ -66,6 +69,26 @@ impl RequestError {
         *response.status_mut() = self.status();
         *response.headers_mut() = headers;
         response
+    }
+
+    /// What the header `www-authenticate` says (RFC 6750, section 3): nothing of errors to who sent no key.
+    fn challenge(&self) -> Option<HeaderValue> {
+        Some(match self {
+            Self::KeyMissing => HeaderValue::from_static("Bearer realm=\"darn\""),
+            Self::KeyUnknown => HeaderValue::from_static(
+                "Bearer realm=\"darn\", error=\"invalid_token\", error_description=\"unknown key\"",
+            ),
+            Self::KeyExpired => HeaderValue::from_static(
+                "Bearer realm=\"darn\", error=\"invalid_token\", error_description=\"expired key\"",
+            ),
+            Self::InsufficientScope { scope } => {
+                let text = format!(
+                    "Bearer realm=\"darn\", error=\"insufficient_scope\", scope=\"{scope}\""
+                );
+                HeaderValue::from_str(&text).ok()?
+            }
+            _ => return None,
+        })
     }
 
     /// The gRPC status, with the code's word as `darn-code` and the problem document as `darn-problem-bin` in its metadata, cut so that

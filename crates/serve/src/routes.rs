@@ -15,12 +15,14 @@ use tower_http::{
     catch_panic::CatchPanicLayer,
     cors::{AllowOrigin, CorsLayer},
 };
-use tracing::{Instrument as _, info, info_span, warn};
+use tracing::{Instrument as _, field::Empty, info, info_span, warn};
 
 use super::{
     accept::preferred,
     app::App,
+    authorization::authorize,
     body::{self, ScanRequest},
+    client::Caller,
     counted::counted_answer,
     digest::{CONTENT_DIGEST, REPR_DIGEST},
     error::RequestError,
@@ -30,6 +32,7 @@ use super::{
     media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, OBJ, PLY, PROMETHEUS, ZIP},
     openapi, parameters,
     prefer::{PREFER, PREFERENCE_APPLIED, Preferences},
+    quota_check::{RATELIMIT, RATELIMIT_POLICY},
     response::{self, ANCHOR_DISTANCE, HOLES_FILLED, LOOPS_SKIPPED, MendResponse, RESULT, STRIP},
     scan_files::AnswerForm,
     service_info, session_routes,
@@ -56,13 +59,14 @@ pub fn routes() -> Router<Arc<App>> {
         .method_not_allowed_fallback(|| async { RequestError::MethodNotAllowed })
 }
 
-/// Adds the layers around all routes of a listener: panics, CORS, the check of the host, and outermost what every answer gets: request
+/// Adds the layers around all routes of a listener: panics, keys, CORS, the check of the host, and outermost what every answer gets: request
 /// ids, problem documents, metrics, the log.
 pub fn finish(routes: Router<Arc<App>>, app: &Arc<App>) -> Router {
     routes
         .layer(CatchPanicLayer::custom(|_| {
             RequestError::Internal.into_response()
         }))
+        .layer(middleware::from_fn_with_state(Arc::clone(app), authorize))
         .layer(cors(&app.allow_origin))
         .layer(middleware::from_fn_with_state(Arc::clone(app), check_host))
         .layer(middleware::from_fn_with_state(Arc::clone(app), observe))
@@ -106,6 +110,9 @@ fn cors(origins: &[String]) -> CorsLayer {
             header::LOCATION,
             header::CONTENT_LOCATION,
             header::RETRY_AFTER,
+            header::WWW_AUTHENTICATE,
+            RATELIMIT,
+            RATELIMIT_POLICY,
         ])
 }
 
@@ -138,7 +145,7 @@ async fn observe(State(app): State<Arc<App>>, mut request: Request, next: Next) 
         .map_or("(none)", MatchedPath::as_str)
         .to_owned();
     let method = excerpt(request.method().as_str());
-    let span = info_span!("request", id = id.0, %method, route);
+    let span = info_span!("request", id = id.0, %method, route, key = Empty);
     request.extensions_mut().insert(id.clone());
 
     let mut response = next.run(request).instrument(span.clone()).await;
@@ -167,7 +174,9 @@ async fn observe(State(app): State<Arc<App>>, mut request: Request, next: Next) 
 
 async fn inpaint(State(app): State<Arc<App>>, request: Request) -> Result<Response, RequestError> {
     let preferences = Preferences::of(request.headers());
-    if let (true, Some(jobs)) = (preferences.respond_async, &app.jobs) {
+    // A preference that the caller's key does not allow is passed over, as any that cannot be followed.
+    let wants_job = preferences.respond_async && Caller::of(request.extensions()).may_hand_over();
+    if let (true, Some(jobs)) = (wants_job, &app.jobs) {
         return job_routes::inpaint_later(&app, jobs, request, preferences).await;
     }
     let headers = request.headers().clone();

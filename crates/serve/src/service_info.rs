@@ -5,7 +5,12 @@ use std::sync::Arc;
 use axum::{extract::State, response::Response};
 use serde::Serialize;
 
-use super::{app::App, response};
+use super::{
+    app::App,
+    client::Caller,
+    key_file::{Expiry, KeyId, KeyLimits, Scope},
+    response,
+};
 
 #[derive(Debug, Serialize)]
 #[serde(rename_all = "camelCase")]
@@ -15,6 +20,23 @@ struct Info {
     /// Whether the service keeps jobs.
     jobs: bool,
     limits: InfoLimits,
+    /// The caller's key, where the service takes keys.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    key: Option<InfoKey>,
+}
+
+#[derive(Debug, Serialize)]
+#[serde(rename_all = "camelCase")]
+struct InfoKey {
+    /// Its name.
+    id: KeyId,
+    /// What it may do.
+    scopes: Vec<Scope>,
+    /// What it may take; nothing bounds what is left out.
+    limits: KeyLimits,
+    /// From when on it is refused.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    expires: Option<Expiry>,
 }
 
 #[derive(Debug, Serialize)]
@@ -29,7 +51,7 @@ struct InfoLimits {
 }
 
 /// Answers `GET /info`.
-pub async fn answer(State(app): State<Arc<App>>) -> Response {
+pub async fn answer(State(app): State<Arc<App>>, caller: Caller) -> Response {
     response::json_response(response::json(&Info {
         version: env!("CARGO_PKG_VERSION"),
         jobs: app.jobs.is_some(),
@@ -38,5 +60,11 @@ pub async fn answer(State(app): State<Arc<App>>) -> Response {
             deadline_seconds: app.limits.deadline.as_secs_f64(),
             session_idle_seconds: app.sessions.limits().idle.as_secs_f64(),
         },
+        key: caller.key.map(|key| InfoKey {
+            id: key.id.clone(),
+            scopes: key.scopes().to_vec(),
+            limits: key.limits,
+            expires: key.expires,
+        }),
     }))
 }

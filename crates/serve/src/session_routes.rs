@@ -16,6 +16,7 @@ use super::{
     accept::preferred,
     app::{App, UploadPermit},
     body::{self, ScanRequest},
+    client::Caller,
     error::RequestError,
     media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, OBJ, OCTET_STREAM, PLY},
     parameters::{self, Parameters},
@@ -52,6 +53,11 @@ impl<S: Send + Sync> FromRequestParts<S> for SessionId {
 }
 
 async fn open(State(app): State<Arc<App>>, request: Request) -> Result<Response, RequestError> {
+    let opener = app.opener(&Caller::of(request.extensions()));
+    if let Err(error) = app.sessions.check_quota(&opener) {
+        body::discard(request, &app.limits);
+        return Err(error.into());
+    }
     let ScanRequest {
         scan,
         parameters,
@@ -61,7 +67,6 @@ async fn open(State(app): State<Arc<App>>, request: Request) -> Result<Response,
     let constraints = parameters::only_selection(parameters.unwrap_or_default())?;
     let (id, sessions) = (Uuid::new_v4(), Arc::clone(&app.sessions));
     let idle_seconds = sessions.limits().idle.as_secs_f64();
-    let client = upload.client();
     let job = app.submit(upload, scan.len(), move |mender, budget| {
         let session = mender.open(scan, &constraints, budget)?;
         let text = session_json(session.described(), id, idle_seconds);
@@ -69,7 +74,7 @@ async fn open(State(app): State<Arc<App>>, request: Request) -> Result<Response,
     });
     // Inserted only while the caller still waits: an abandoned session must not evict another.
     let (session, text) = job.await?;
-    run_blocking(move || sessions.insert(id, client, session, Instant::now())).await?;
+    run_blocking(move || sessions.insert(id, opener, session, Instant::now())).await?;
     let headers = [
         (header::CONTENT_TYPE, JSON.to_owned()),
         (header::LOCATION, format!("/sessions/{id}")),
@@ -149,10 +154,11 @@ async fn result(
 async fn delete(
     State(app): State<Arc<App>>,
     SessionId(id): SessionId,
+    caller: Caller,
 ) -> Result<StatusCode, RequestError> {
     app.check_serving()?;
-    let sessions = Arc::clone(&app.sessions);
-    run_blocking(move || sessions.delete(id, Instant::now())).await?;
+    let (sessions, client) = (Arc::clone(&app.sessions), app.client(&caller));
+    run_blocking(move || sessions.delete(id, &client, Instant::now())).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -166,7 +172,8 @@ struct SessionRequest<P> {
 /// Takes an upload permit for a request to a session that exists.
 fn session_permit(app: &App, id: Uuid, request: &Request) -> Result<UploadPermit, RequestError> {
     app.check_serving()?;
-    app.sessions.check(id, Instant::now())?;
+    let client = app.client(&Caller::of(request.extensions()));
+    app.sessions.check(id, &client, Instant::now())?;
     app.upload_permit_of(request, parameters::MAX_BYTES)
 }
 

@@ -3,6 +3,8 @@
 //!
 //! A request that uses a session holds a [`SessionLease`]. A leased session is not freed: deleting it takes effect after its last
 //! lease. Sessions without a lease are ordered by last use; the least recently used one ends first.
+//!
+//! A session that was opened with a key is there for that key alone; others are told that there is none.
 
 use std::{
     collections::{BTreeMap, HashMap},
@@ -14,9 +16,10 @@ use tokio::sync::OwnedSemaphorePermit;
 use uuid::Uuid;
 
 use super::{
-    ended_sessions::{EndReason, EndedSessions},
-    fair_queue::Client,
+    client::{Client, may_use},
+    ended_sessions::{End, EndReason, EndedSessions},
     kept_session::KeptSession,
+    quota::Exceeded,
     telemetry::SessionMetrics,
 };
 use darn_contract::port::EditSession;
@@ -45,6 +48,9 @@ pub enum SessionError {
         /// Most requests at once.
         limit: usize,
     },
+    /// As many sessions of its key are open as may be.
+    #[error(transparent)]
+    Quota(Exceeded),
     /// It needs more memory than all sessions together may take.
     #[error(
         "kept for editing this scan takes {bytes} bytes; all sessions together may take {limit} (DARN_SESSION_MEMORY)"
@@ -72,6 +78,15 @@ pub struct SessionLimits {
     pub idle: Duration,
     /// Most bytes of all sessions together.
     pub memory: usize,
+}
+
+/// Who opens a session.
+#[derive(Debug, Clone, Default)]
+pub struct Opener {
+    /// The client.
+    pub client: Client,
+    /// Most sessions that it may have open.
+    pub most: Option<u64>,
 }
 
 /// All sessions.
@@ -129,15 +144,23 @@ impl SessionStore {
         self.limits
     }
 
+    /// Checks that a client may open one more session.
+    ///
+    /// # Errors
+    /// `Quota`.
+    pub fn check_quota(&self, opener: &Opener) -> Result<(), SessionError> {
+        self.lock().check_quota(opener)
+    }
+
     /// Keeps a client's session under a new id; ends sessions whose memory it needs, first those of the client whose sessions take most. Blocks
     /// while their memory is freed.
     ///
     /// # Errors
-    /// `TooLarge` or `Full`; then no session was ended to make room.
+    /// `Quota`, `TooLarge` or `Full`; then no session was ended to make room.
     pub fn insert(
         &self,
         id: Uuid,
-        client: Client,
+        opener: Opener,
         session: Box<dyn EditSession>,
         now: Instant,
     ) -> Result<(), SessionError> {
@@ -149,18 +172,22 @@ impl SessionStore {
         }
         let mut state = self.lock();
         let mut ended = state.expire(now, self.limits.idle, &self.metrics);
-        if state.leased_bytes() + bytes > limit {
+        let room = match state.check_quota(&opener) {
+            Ok(()) if state.leased_bytes() + bytes > limit => Err(SessionError::Full { limit }),
+            checked => checked,
+        };
+        if room.is_err() {
             self.publish(&state);
             // Release the lock before `ended` is freed, which may take long.
             drop(state);
-            return Err(SessionError::Full { limit });
+            return room;
         }
         ended.extend(state.evict(limit - bytes, &self.metrics));
         let use_number = state.enqueue(id);
         state.bytes += bytes;
         let entry = SessionEntry {
             session,
-            client,
+            client: opener.client,
             bytes,
             leases: 0,
             last_used: now,
@@ -179,17 +206,23 @@ impl SessionStore {
     ///
     /// # Errors
     /// `Unknown` or `Ended`.
-    pub fn check(&self, id: Uuid, now: Instant) -> Result<(), SessionError> {
-        self.lock().find(id, now, self.limits.idle).map(drop)
+    pub fn check(&self, id: Uuid, client: &Client, now: Instant) -> Result<(), SessionError> {
+        let mut state = self.lock();
+        state.find(id, client, now, self.limits.idle).map(drop)
     }
 
     /// Leases a session: it is kept until the lease is dropped.
     ///
     /// # Errors
     /// `Unknown`, `Ended` or `Busy`.
-    pub fn lease(self: &Arc<Self>, id: Uuid, now: Instant) -> Result<SessionLease, SessionError> {
+    pub fn lease(
+        self: &Arc<Self>,
+        id: Uuid,
+        client: &Client,
+        now: Instant,
+    ) -> Result<SessionLease, SessionError> {
         let mut state = self.lock();
-        let entry = state.find(id, now, self.limits.idle)?;
+        let entry = state.find(id, client, now, self.limits.idle)?;
         if entry.leases == MAX_LEASES {
             return Err(SessionError::Busy { limit: MAX_LEASES });
         }
@@ -208,16 +241,18 @@ impl SessionStore {
     ///
     /// # Errors
     /// `Unknown` or `Ended`.
-    pub fn delete(&self, id: Uuid, now: Instant) -> Result<(), SessionError> {
+    pub fn delete(&self, id: Uuid, client: &Client, now: Instant) -> Result<(), SessionError> {
         let mut state = self.lock();
-        let entry = state.find(id, now, self.limits.idle)?;
+        let entry = state.find(id, client, now, self.limits.idle)?;
+        let client = entry.client.clone();
         let removed = if entry.leases > 0 {
             entry.is_deleted = true;
             None
         } else {
             state.remove(id)
         };
-        state.ended.record(id, EndReason::Deleted);
+        let reason = EndReason::Deleted;
+        state.ended.record(id, End { reason, client });
         self.metrics.deleted.increment(1);
         self.publish(&state);
         drop(state);
@@ -246,7 +281,7 @@ impl SessionStore {
         let mut ended = Vec::new();
         if entry.leases == 0 {
             if entry.is_deleted {
-                ended.extend(state.remove(id));
+                ended.extend(state.remove(id).map(|entry| entry.session));
             } else {
                 let use_number = state.enqueue(id);
                 if let Some(entry) = state.live.get_mut(&id) {
@@ -286,20 +321,37 @@ impl StoreState {
     fn find(
         &mut self,
         id: Uuid,
+        client: &Client,
         now: Instant,
         idle: Duration,
     ) -> Result<&mut SessionEntry, SessionError> {
-        if let Some(reason) = self.ended.reason(&id) {
-            return Err(SessionError::Ended(reason));
+        if let Some(end) = self.ended.end(&id) {
+            return Err(match may_use(&end.client, client) {
+                true => SessionError::Ended(end.reason),
+                false => SessionError::Unknown,
+            });
         }
         match self.live.get_mut(&id) {
             None => Err(SessionError::Unknown),
+            Some(entry) if !may_use(&entry.client, client) => Err(SessionError::Unknown),
             Some(entry) if entry.is_deleted => Err(SessionError::Ended(EndReason::Deleted)),
             // Idle for too long, and not ended yet by `end_idle`.
             Some(entry) if entry.leases == 0 && is_over(entry.last_used, now, idle) => {
                 Err(SessionError::Ended(EndReason::Idle))
             }
             Some(entry) => Ok(entry),
+        }
+    }
+
+    fn check_quota(&self, opener: &Opener) -> Result<(), SessionError> {
+        let Some(most) = opener.most else {
+            return Ok(());
+        };
+        let open = |entry: &&SessionEntry| entry.client == opener.client && !entry.is_deleted;
+        if (self.live.values().filter(open).count() as u64) < most {
+            Ok(())
+        } else {
+            Err(SessionError::Quota(Exceeded::sessions(most)))
         }
     }
 
@@ -316,11 +368,20 @@ impl StoreState {
         leased.map(|entry| entry.bytes).sum()
     }
 
-    fn remove(&mut self, id: Uuid) -> Option<Arc<KeptSession>> {
+    fn remove(&mut self, id: Uuid) -> Option<SessionEntry> {
         let entry = self.live.remove(&id)?;
         self.unleased.remove(&entry.use_number);
         self.bytes -= entry.bytes;
-        Some(entry.session)
+        Some(entry)
+    }
+
+    /// Ends a session, for a reason that is remembered.
+    fn end(&mut self, id: Uuid, reason: EndReason) -> Option<Arc<KeptSession>> {
+        let SessionEntry {
+            session, client, ..
+        } = self.remove(id)?;
+        self.ended.record(id, End { reason, client });
+        Some(session)
     }
 
     /// Ends sessions until all take at most `limit` bytes, or only leased ones are left: of the client whose unleased sessions take most the
@@ -331,8 +392,7 @@ impl StoreState {
             let Some(id) = self.first_to_end() else {
                 break;
             };
-            ended.extend(self.remove(id));
-            self.ended.record(id, EndReason::Evicted);
+            ended.extend(self.end(id, EndReason::Evicted));
             metrics.evicted.increment(1);
         }
         ended
@@ -340,7 +400,7 @@ impl StoreState {
 
     /// The least recently used session of the client whose unleased sessions take most memory.
     fn first_to_end(&self) -> Option<Uuid> {
-        let mut bytes: HashMap<Client, usize> = HashMap::new();
+        let mut bytes: HashMap<&Client, usize> = HashMap::new();
         // In order of use, so that of clients with equally much the least recently used one is met first.
         let unleased = || {
             self.unleased
@@ -348,7 +408,7 @@ impl StoreState {
                 .filter_map(|id| Some((id, self.live.get(id)?)))
         };
         for (_, entry) in unleased() {
-            *bytes.entry(entry.client).or_default() += entry.bytes;
+            *bytes.entry(&entry.client).or_default() += entry.bytes;
         }
         let most = bytes.values().copied().max()?;
         unleased()
@@ -368,8 +428,7 @@ impl StoreState {
             if (self.live.get(&id)).is_some_and(|entry| !is_over(entry.last_used, now, idle)) {
                 break;
             }
-            ended.extend(self.remove(id));
-            self.ended.record(id, EndReason::Idle);
+            ended.extend(self.end(id, EndReason::Idle));
             metrics.expired.increment(1);
         }
         ended

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use proptest::prelude::*;
 
 use super::*;
+use crate::client::ClientId;
 use crate::client_address::ClientAddress;
 use crate::kept_session::OVERHEAD;
 use crate::telemetry::Metrics;
@@ -63,6 +64,8 @@ struct TestStore {
     alive: Arc<AtomicUsize>,
     /// Who opens the next sessions.
     client: Client,
+    /// How many each of them may have open.
+    most: Option<u64>,
     now: Instant,
 }
 
@@ -73,6 +76,7 @@ impl TestStore {
             sessions: SessionStore::new(limits, Metrics::new().unwrap().sessions()),
             alive: Arc::default(),
             client: None,
+            most: None,
             now: Instant::now(),
         }
     }
@@ -86,14 +90,18 @@ impl TestStore {
             alive: Arc::clone(&self.alive),
         };
         let id = Uuid::new_v4();
+        let opener = Opener {
+            client: self.client.clone(),
+            most: self.most,
+        };
         let opened = self
             .sessions
-            .insert(id, self.client, Box::new(session), self.now);
+            .insert(id, opener, Box::new(session), self.now);
         opened.map(|()| (id, size))
     }
 
     fn end_of(&self, id: Uuid) -> Option<EndReason> {
-        match self.sessions.check(id, self.now) {
+        match self.sessions.check(id, &self.client, self.now) {
             Ok(()) => None,
             Err(SessionError::Ended(reason)) => Some(reason),
             Err(error) => panic!("{error}"),
@@ -113,7 +121,7 @@ impl TestStore {
 fn the_least_recently_used_session_is_evicted_first() {
     let store = TestStore::of(30_000);
     let [a, b, c] = [(); 3].map(|()| store.open(10_000).unwrap().0);
-    drop(store.sessions.lease(a, store.now).unwrap());
+    drop(store.sessions.lease(a, &None, store.now).unwrap());
     let d = store.open(10_000).unwrap().0;
     assert_eq!(store.end_of(b), Some(EndReason::Evicted));
     assert_eq!([a, c, d].map(|id| store.end_of(id)), [None; 3]);
@@ -130,14 +138,14 @@ fn the_least_recently_used_session_is_evicted_first() {
 fn a_leased_session_is_not_freed() {
     let mut store = TestStore::of(20_000);
     let (used, _) = store.open(15_000).unwrap();
-    let lease = store.sessions.lease(used, store.now).unwrap();
+    let lease = store.sessions.lease(used, &None, store.now).unwrap();
     let limit = 20_000;
     assert_eq!(store.open(10_000).err(), Some(SessionError::Full { limit }));
     store.now += IDLE * 2;
     store.sessions.end_idle(store.now);
     assert_eq!(store.end_of(used), None);
 
-    store.sessions.delete(used, store.now).unwrap();
+    store.sessions.delete(used, &None, store.now).unwrap();
     assert_eq!(store.end_of(used), Some(EndReason::Deleted));
     assert_eq!(store.alive(), 1, "the lease still has it");
     drop(lease);
@@ -150,7 +158,7 @@ fn a_refused_session_ends_no_other() {
     let store = TestStore::of(20_000);
     let (idle, _) = store.open(5_000).unwrap();
     let (used, _) = store.open(15_000).unwrap();
-    let _lease = store.sessions.lease(used, store.now).unwrap();
+    let _lease = store.sessions.lease(used, &None, store.now).unwrap();
     assert!(matches!(
         store.open(10_000).err(),
         Some(SessionError::Full { .. })
@@ -171,7 +179,7 @@ fn an_idle_session_ends_and_a_used_one_stays() {
     store.now += IDLE / 2;
     // Before and after idle sessions are ended.
     assert_eq!(store.end_of(left), Some(EndReason::Idle));
-    assert!(store.sessions.lease(left, store.now).is_err());
+    assert!(store.sessions.lease(left, &None, store.now).is_err());
     assert_eq!(store.alive(), 2);
     store.sessions.end_idle(store.now);
     assert_eq!(store.end_of(left), Some(EndReason::Idle));
@@ -185,11 +193,11 @@ fn an_idle_session_ends_and_a_used_one_stays() {
 #[test]
 fn an_unknown_id_is_told_from_that_of_an_ended_session() {
     let store = TestStore::of(100_000);
-    let unknown = store.sessions.check(Uuid::new_v4(), store.now);
+    let unknown = store.sessions.check(Uuid::new_v4(), &None, store.now);
     assert_eq!(unknown, Err(SessionError::Unknown));
     let (id, _) = store.open(10_000).unwrap();
-    store.sessions.delete(id, store.now).unwrap();
-    let twice = store.sessions.delete(id, store.now);
+    store.sessions.delete(id, &None, store.now).unwrap();
+    let twice = store.sessions.delete(id, &None, store.now);
     assert_eq!(twice, Err(SessionError::Ended(EndReason::Deleted)));
 }
 
@@ -200,7 +208,7 @@ async fn a_session_that_grew_evicts_others_when_released() {
     let (grows, size) = store.open(10_000).unwrap();
     let guard = store
         .sessions
-        .lease(grows, store.now)
+        .lease(grows, &None, store.now)
         .unwrap()
         .exclusive()
         .await;
@@ -217,14 +225,14 @@ async fn exclusive_use_comes_in_order_and_waiting_requests_are_bounded() {
     let (id, _) = store.open(10_000).unwrap();
     let first = store
         .sessions
-        .lease(id, store.now)
+        .lease(id, &None, store.now)
         .unwrap()
         .exclusive()
         .await;
     let order = Arc::new(Mutex::new(Vec::new()));
     let mut waiting = Vec::new();
     for i in 1..MAX_LEASES {
-        let lease = store.sessions.lease(id, store.now).unwrap();
+        let lease = store.sessions.lease(id, &None, store.now).unwrap();
         let order = Arc::clone(&order);
         waiting.push(tokio::spawn(async move {
             let guard = lease.exclusive().await;
@@ -233,7 +241,7 @@ async fn exclusive_use_comes_in_order_and_waiting_requests_are_bounded() {
         tokio::task::yield_now().await;
     }
     let limit = MAX_LEASES;
-    let more = store.sessions.lease(id, store.now).err();
+    let more = store.sessions.lease(id, &None, store.now).err();
     assert_eq!(more, Some(SessionError::Busy { limit }));
     assert!(order.lock().unwrap().is_empty());
     // A request that is dropped no longer waits.
@@ -243,7 +251,7 @@ async fn exclusive_use_comes_in_order_and_waiting_requests_are_bounded() {
         task.await.unwrap();
     }
     assert_eq!(*order.lock().unwrap(), [2, 3]);
-    assert!(store.sessions.lease(id, store.now).is_ok());
+    assert!(store.sessions.lease(id, &None, store.now).is_ok());
 }
 
 #[test]
@@ -309,11 +317,11 @@ proptest! {
             match step {
                 Step::Open(bytes) => ids.extend(store.open(bytes).ok().map(|(id, _)| id)),
                 Step::Lease(i) if !ids.is_empty() => {
-                    leases.extend(store.sessions.lease(ids[i % ids.len()], store.now).ok());
+                    leases.extend(store.sessions.lease(ids[i % ids.len()], &None, store.now).ok());
                 }
                 Step::Release(i) if !leases.is_empty() => drop(leases.swap_remove(i % leases.len())),
                 Step::Delete(i) if !ids.is_empty() => {
-                    store.sessions.delete(ids[i % ids.len()], store.now).ok();
+                    store.sessions.delete(ids[i % ids.len()], &None, store.now).ok();
                 }
                 Step::Wait(seconds) => {
                     store.now += Duration::from_secs(seconds);
@@ -342,9 +350,8 @@ proptest! {
 fn a_client_with_many_sessions_ends_its_own_first() {
     let mut store = TestStore::of(100_000);
     let client = |n: u8| {
-        Some(ClientAddress::of(
-            std::net::Ipv4Addr::new(192, 0, 2, n).into(),
-        ))
+        let address = std::net::Ipv4Addr::new(192, 0, 2, n).into();
+        Some(ClientId::Address(ClientAddress::of(address)))
     };
     store.client = client(1);
     let (quiet, _) = store.open(10_000).unwrap();
@@ -354,4 +361,47 @@ fn a_client_with_many_sessions_ends_its_own_first() {
     assert_eq!(store.end_of(many[0]), Some(EndReason::Evicted));
     assert_eq!(store.end_of(many[699]), None);
     assert!(store.bytes() <= 100_000);
+}
+
+#[test]
+fn a_session_of_a_key_is_there_for_that_key_alone() {
+    let key = |id: &str| Some(ClientId::Key(id.parse().unwrap()));
+    let mut store = TestStore::of(10_000);
+    store.client = key("a");
+    let ids = [(); 3].map(|()| store.open(2000).unwrap().0);
+    store.sessions.delete(ids[1], &key("a"), store.now).unwrap();
+    let lease = store.sessions.lease(ids[2], &key("a"), store.now).unwrap();
+    store.sessions.delete(ids[2], &key("a"), store.now).unwrap();
+    for other in [key("b"), None] {
+        // One that is open, one that has ended, and one that ends after its last lease.
+        for id in ids {
+            let unknown = Err(SessionError::Unknown);
+            assert_eq!(store.sessions.check(id, &other, store.now), unknown);
+            assert!(store.sessions.lease(id, &other, store.now).is_err());
+            assert_eq!(store.sessions.delete(id, &other, store.now), unknown);
+        }
+    }
+    let ended = Some(EndReason::Deleted);
+    assert_eq!(ids.map(|id| store.end_of(id)), [None, ended, ended]);
+    drop(lease);
+}
+
+#[test]
+fn a_client_has_as_many_sessions_open_as_it_may() {
+    let key = |id: &str| Some(ClientId::Key(id.parse().unwrap()));
+    let mut store = TestStore::of(100_000);
+    store.most = Some(2);
+    for client in [key("a"), key("b")] {
+        store.client = client.clone();
+        let (first, _) = store.open(2000).unwrap();
+        store.open(2000).unwrap();
+        let refused = store.open(2000).map(drop);
+        assert_eq!(refused, Err(SessionError::Quota(Exceeded::sessions(2))));
+        store.sessions.delete(first, &client, store.now).unwrap();
+        store.open(2000).unwrap();
+    }
+    // Those that are idle for too long count no more.
+    store.now += 2 * IDLE;
+    store.open(2000).unwrap();
+    assert_eq!(store.alive(), 1);
 }

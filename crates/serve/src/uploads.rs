@@ -8,7 +8,10 @@ use std::{
 use axum::body::{Body, HttpBody as _};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use super::{client_address::ClientAddress, parameters};
+use super::{
+    client::{Client, ClientId},
+    parameters,
+};
 
 /// Most bytes of a small body. Edits of a session are never larger.
 const SMALL_BODY: u64 = parameters::MAX_BYTES as u64;
@@ -45,12 +48,12 @@ impl BodySize {
 pub enum UploadRefusal {
     /// So many bodies of its size are being received.
     Full(usize),
-    /// So many bodies of its size are being received from its address, and no more could be received beside them from all others.
+    /// So many bodies of its size are being received from its client, and no more could be received beside them from all others.
     ShareFull(usize),
 }
 
-/// The bodies being received. Those of each size have slots of their own, and one address may hold as many of them as are left free: half of
-/// them when it is alone, and so many addresses as halve them again and again until one is left are needed to take them all.
+/// The bodies being received. Those of each size have slots of their own, and one client may hold as many of them as are left free: half of
+/// them when it is alone, and so many clients as halve them again and again until one is left are needed to take them all.
 #[derive(Debug)]
 pub struct Uploads {
     bodiless: Slots,
@@ -60,29 +63,24 @@ pub struct Uploads {
 
 impl Uploads {
     /// So many slots for large bodies, and [`SMALL_FOR_LARGE`] times as many for small ones.
-    pub fn new(slots: usize, sharing: Sharing) -> Self {
+    pub fn new(slots: usize) -> Self {
         Self {
-            bodiless: Slots::new(MAX_BODILESS, Sharing::Anybody),
-            small: Slots::new(SMALL_FOR_LARGE * slots, sharing),
-            large: Slots::new(slots, sharing),
+            bodiless: Slots::new(MAX_BODILESS),
+            small: Slots::new(SMALL_FOR_LARGE * slots),
+            large: Slots::new(slots),
         }
     }
 
-    /// Takes a slot.
+    /// Takes a slot. Who is no client in particular may hold all of them, and so may anybody that sends no body.
     ///
     /// # Errors
     /// All slots of this size are taken, or this client's share of them.
-    pub fn take(
-        &self,
-        size: BodySize,
-        client: Option<ClientAddress>,
-    ) -> Result<UploadSlot, UploadRefusal> {
-        let slots = match size {
-            BodySize::None => &self.bodiless,
-            BodySize::Small => &self.small,
-            BodySize::Large => &self.large,
-        };
-        slots.take(client)
+    pub fn take(&self, size: BodySize, client: &Client) -> Result<UploadSlot, UploadRefusal> {
+        match size {
+            BodySize::None => self.bodiless.take(&None),
+            BodySize::Small => self.small.take(client),
+            BodySize::Large => self.large.take(client),
+        }
     }
 
     /// Waits until no slot is taken.
@@ -95,45 +93,34 @@ impl Uploads {
     }
 }
 
-/// Whether addresses tell clients apart.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sharing {
-    /// One address may hold as many slots as it leaves free.
-    ByAddress,
-    /// Anybody may hold all slots: behind a proxy all clients have one address.
-    Anybody,
-}
-
 /// Slots for bodies of one size.
 #[derive(Debug)]
 struct Slots {
     free: Arc<Semaphore>,
     limit: usize,
-    sharing: Sharing,
     held: Arc<Held>,
 }
 
 impl Slots {
-    fn new(limit: usize, sharing: Sharing) -> Self {
+    fn new(limit: usize) -> Self {
         Self {
             free: Arc::new(Semaphore::new(limit)),
             limit,
-            sharing,
             held: Arc::default(),
         }
     }
 
-    fn take(&self, client: Option<ClientAddress>) -> Result<UploadSlot, UploadRefusal> {
+    fn take(&self, client: &Client) -> Result<UploadSlot, UploadRefusal> {
         // Counted with the slot: another request may take slots meanwhile, so the share is that of a moment ago at worst.
         let free = self.free.available_permits();
         let slot = Arc::clone(&self.free).try_acquire_owned();
         let slot = slot.map_err(|_| UploadRefusal::Full(self.limit))?;
-        let share = match (self.sharing, client) {
-            (Sharing::ByAddress, Some(client)) => {
-                let share = Held::take(&self.held, client, free);
+        let share = match client {
+            Some(client) => {
+                let share = Held::take(&self.held, client.clone(), free);
                 Some(share.map_err(UploadRefusal::ShareFull)?)
             }
-            _ => None,
+            None => None,
         };
         Ok(UploadSlot {
             _slot: slot,
@@ -149,12 +136,12 @@ pub struct UploadSlot {
     _share: Option<Share>,
 }
 
-/// Slots that each address holds.
+/// Slots that each client holds.
 #[derive(Debug, Default)]
-struct Held(Mutex<HashMap<ClientAddress, usize>>);
+struct Held(Mutex<HashMap<ClientId, usize>>);
 
 impl Held {
-    fn lock(&self) -> MutexGuard<'_, HashMap<ClientAddress, usize>> {
+    fn lock(&self) -> MutexGuard<'_, HashMap<ClientId, usize>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -162,13 +149,13 @@ impl Held {
     ///
     /// # Errors
     /// The number of slots that it holds.
-    fn take(self: &Arc<Self>, client: ClientAddress, most: usize) -> Result<Share, usize> {
+    fn take(self: &Arc<Self>, client: ClientId, most: usize) -> Result<Share, usize> {
         let mut held = self.lock();
         let count = held.get(&client).copied().unwrap_or(0);
         if count >= most {
             return Err(count);
         }
-        held.insert(client, count + 1);
+        held.insert(client.clone(), count + 1);
         drop(held);
         let held = Arc::clone(self);
         Ok(Share { client, held })
@@ -178,7 +165,7 @@ impl Held {
 /// One slot of a client; given back when dropped.
 #[derive(Debug)]
 struct Share {
-    client: ClientAddress,
+    client: ClientId,
     held: Arc<Held>,
 }
 
@@ -195,28 +182,30 @@ impl Drop for Share {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::client_address::ClientAddress;
 
-    fn client(last: u8) -> Option<ClientAddress> {
-        Some(ClientAddress::of([192, 0, 2, last].into()))
+    fn client(last: u8) -> Client {
+        let address = ClientAddress::of([192, 0, 2, last].into());
+        Some(ClientId::Address(address))
     }
 
     #[test]
-    fn many_addresses_leave_a_slot_for_one_more() {
-        let uploads = Uploads::new(18, Sharing::ByAddress);
+    fn many_clients_leave_a_slot_for_one_more() {
+        let uploads = Uploads::new(18);
         let mut slots = Vec::new();
         for last in 0..6 {
-            while let Ok(slot) = uploads.take(BodySize::Small, client(last)) {
+            while let Ok(slot) = uploads.take(BodySize::Small, &client(last)) {
                 slots.push(slot);
             }
         }
         assert!(slots.len() > 100);
-        assert!(uploads.take(BodySize::Small, client(7)).is_ok());
+        assert!(uploads.take(BodySize::Small, &client(7)).is_ok());
     }
 
     #[test]
-    fn one_address_holds_at_most_half_of_the_slots() {
-        let uploads = Uploads::new(3, Sharing::ByAddress);
-        let take = |size, last| uploads.take(size, client(last));
+    fn one_client_holds_at_most_half_of_the_slots() {
+        let uploads = Uploads::new(3);
+        let take = |size, last| uploads.take(size, &client(last));
         let first = take(BodySize::Large, 1).unwrap();
         let _second = take(BodySize::Large, 1).unwrap();
         let refusal = take(BodySize::Large, 1).unwrap_err();
@@ -234,18 +223,18 @@ mod tests {
     }
 
     #[test]
-    fn an_address_that_holds_nothing_is_forgotten() {
-        let uploads = Uploads::new(4, Sharing::ByAddress);
-        let slots = [(); 2].map(|()| uploads.take(BodySize::Small, client(1)).unwrap());
+    fn a_client_that_holds_nothing_is_forgotten() {
+        let uploads = Uploads::new(4);
+        let slots = [(); 2].map(|()| uploads.take(BodySize::Small, &client(1)).unwrap());
         drop(slots);
         assert!(uploads.small.held.lock().is_empty());
     }
 
     #[test]
-    fn anybody_may_hold_all_slots_where_addresses_say_nothing() {
-        let uploads = Uploads::new(2, Sharing::Anybody);
-        let _slots = [(); 2].map(|()| uploads.take(BodySize::Large, client(1)).unwrap());
-        let refusal = uploads.take(BodySize::Large, client(1)).unwrap_err();
+    fn who_is_no_client_in_particular_may_hold_all_slots() {
+        let uploads = Uploads::new(2);
+        let _slots = [(); 2].map(|()| uploads.take(BodySize::Large, &None).unwrap());
+        let refusal = uploads.take(BodySize::Large, &None).unwrap_err();
         assert_eq!(refusal, UploadRefusal::Full(2));
     }
 
