@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { load } from './sources.mjs';
 
-const { Latest, partsOf, problemOf } = await load('client.ts');
+const { Latest, Service, partsOf, problemOf } = await load('client.ts');
 const { History } = await load('model/history.ts');
 const { boundaryLines, linesOfLoops } = await load('scene/boundary.ts');
 const { readConstraints, onHoles, selectionOf, statelessMessageOf } = await load('model/constraints.ts');
@@ -198,4 +198,45 @@ test('a glTF takes the files in that it refers to, and says which one is missing
   const glb = file('scan.glb', 'x');
   assert.deepEqual(await scanOf([file('notes.txt', ''), glb]), { file: glb, name: 'scan.glb' });
   assert.equal(await scanOf([]), undefined);
+});
+
+/** A service that takes one key, in place of the network; what it was sent. */
+async function withService(key, body) {
+  const seen = [];
+  const real = globalThis.fetch;
+  globalThis.fetch = async (url, { headers }) => {
+    seen.push(headers.authorization);
+    const status = headers.authorization === `Bearer ${key}` ? 200 : 401;
+    const document = status === 200 ? { version: '1' } : { code: 'key_unknown', detail: 'unknown' };
+    return new Response(JSON.stringify(document), { status });
+  };
+  try {
+    await body(seen);
+  } finally {
+    globalThis.fetch = real;
+  }
+}
+
+const SOMEWHERE = new URL('https://darn.example/');
+
+test('a key is asked for once, however many requests are refused, and until one is taken', async () => {
+  await withService('right', async (seen) => {
+    const answers = ['wrong', 'right'];
+    const service = new Service(SOMEWHERE, { askForKey: async () => answers.shift() });
+    const infos = await Promise.all([service.info(), service.info()]);
+    assert.deepEqual(infos, [{ version: '1' }, { version: '1' }]);
+    assert.deepEqual(answers, []);
+    await service.info();
+    assert.equal(seen.at(-1), 'Bearer right');
+  });
+});
+
+test('without a key, or with a wrong one and nobody to ask, a request is refused', async () => {
+  await withService('right', async (seen) => {
+    await assert.rejects(new Service(SOMEWHERE).info(), { code: 'key_unknown', keyIsRefused: true });
+    await assert.rejects(new Service(SOMEWHERE, { key: 'wrong' }).info(), { status: 401 });
+    await assert.rejects(new Service(SOMEWHERE, { askForKey: async () => undefined }).info(), { status: 401 });
+    assert.deepEqual(seen, [undefined, 'Bearer wrong', undefined]);
+    await new Service(SOMEWHERE, { key: 'right' }).info();
+  });
 });

@@ -16,6 +16,11 @@ export class ProblemError extends Error {
     super(detail);
   }
 
+  /** Whether the service takes keys, and the request had none that it takes. */
+  get keyIsRefused(): boolean {
+    return this.status === 401;
+  }
+
   /** Whether the session that the request named is gone. */
   get sessionIsGone(): boolean {
     return this.status === 410 || this.code === 'session_not_found';

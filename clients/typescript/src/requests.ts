@@ -21,9 +21,16 @@ export interface Progress {
   signal?: AbortSignal;
 }
 
-/** Sends `body` by XMLHttpRequest, which unlike `fetch` tells how much was sent. Waits and tries again on 503. */
-export function upload(url: URL, body: FormData, progress: Progress = {}): Promise<Answer> {
-  return patiently(progress, () => uploadOnce(url, body, progress));
+/** A form that is posted to an address. */
+export interface Upload {
+  readonly url: URL;
+  readonly headers: Readonly<Record<string, string>>;
+  readonly body: FormData;
+}
+
+/** Sends a form by XMLHttpRequest, which unlike `fetch` tells how much was sent. Waits and tries again on 503. */
+export function upload(form: Upload, progress: Progress = {}): Promise<Answer> {
+  return patiently(progress, () => uploadOnce(form, progress));
 }
 
 /** Sends a request by `fetch`. Waits and tries again on 503. */
@@ -67,10 +74,13 @@ function pause(seconds: number, signal: AbortSignal | undefined): Promise<void> 
   });
 }
 
-function uploadOnce(url: URL, body: FormData, { onSent, signal }: Progress): Promise<Answer> {
+function uploadOnce({ url, headers, body }: Upload, { onSent, signal }: Progress): Promise<Answer> {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
     request.open('POST', url);
+    for (const [name, value] of Object.entries(headers)) {
+      request.setRequestHeader(name, value);
+    }
     request.responseType = 'arraybuffer';
     request.upload.onprogress = (event) => {
       if (event.lengthComputable && event.total > 0) {

@@ -4,6 +4,8 @@
  * - `base-url`: the address of the service, ending in `/`; by default the one that this module was loaded from. It is read once, before
  *   the first scan is opened.
  * - `src`: the address of the scan to open.
+ * - `key`: the key of a service that takes keys. Without it a person is asked for one when the service refuses a request, and it is kept as long
+ *   as the tab is open.
  *
  * It emits `opened`, `mended`, `edited` and `saved`, which bubble out of shadow trees. The detail of `mended` and `edited` has the report
  * and the constraints, that of `saved` the file; a listener that prevents the default of `saved` keeps the page from downloading it.
@@ -16,6 +18,7 @@ import { download } from './download.js';
 import './chart_panel.js';
 import './constraints_panel.js';
 import './holes_panel.js';
+import { type KeyDialog, TabKeys } from './key_dialog.js';
 import './look_panel.js';
 import './report_panel.js';
 import { Stage } from './stage.js';
@@ -126,9 +129,10 @@ export class EditorElement extends LitElement {
     `,
   ];
 
-  static override properties = { src: {}, baseUrl: { attribute: 'base-url' } };
+  static override properties = { src: {}, key: {}, baseUrl: { attribute: 'base-url' } };
 
   declare src: string | undefined;
+  declare key: string | undefined;
   declare baseUrl: string | undefined;
   private dragging = false;
   private made: Editor | undefined;
@@ -147,7 +151,15 @@ export class EditorElement extends LitElement {
   }
 
   private makeEditor(): Editor {
-    const editor = new Editor(new Service(this.base));
+    const keys = new TabKeys(this.base);
+    const askForKey = async (): Promise<string | undefined> => {
+      await this.updateComplete;
+      const given = await this.keyDialog?.ask();
+      keys.keep(given);
+      return given;
+    };
+    const service = new Service(this.base, { key: this.key ?? keys.kept, askForKey });
+    const editor = new Editor(service);
     editor.addEventListener('change', () => this.requestUpdate());
     editor.addEventListener('opened', () => this.emit('opened', { name: editor.scan?.name }));
     for (const name of ['mended', 'edited']) {
@@ -254,6 +266,7 @@ export class EditorElement extends LitElement {
               `
         }
       </aside>
+      <darn-key></darn-key>
       <div class="hidden" role="status" aria-live="polite">${editor.work?.label ?? editor.message}</div>
     `;
   }
@@ -300,6 +313,10 @@ export class EditorElement extends LitElement {
         ></progress>
       </div>
     `;
+  }
+
+  private get keyDialog(): KeyDialog | null {
+    return this.renderRoot.querySelector<KeyDialog>('darn-key');
   }
 
   private get stage(): Stage | null {
