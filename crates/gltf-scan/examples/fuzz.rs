@@ -2,7 +2,7 @@
 //! limits allow. `scripts/fuzz` runs it.
 //!
 //! ```sh
-//! scripts/fuzz --minutes 10 --seed 7 [--target glb|json|draco|meshopt|zip]
+//! scripts/fuzz --minutes 10 --seed 7 [--target glb|json|draco|meshopt|zip|obj|ply]
 //! ```
 //!
 //! The same seed gives the same mutations. A scan that panics is written to the working directory as `fuzz-TARGET-SEED-RUN`.
@@ -181,6 +181,14 @@ fn targets() -> Result<Vec<Target>, Box<dyn Error>> {
             name: "zip",
             seeds: vec![zip.finish()?.into_inner()],
         },
+        Target {
+            name: "obj",
+            seeds: vec![obj(&mesh)],
+        },
+        Target {
+            name: "ply",
+            seeds: vec![ply(&mesh, false), ply(&mesh, true)],
+        },
     ])
 }
 
@@ -190,6 +198,52 @@ fn separate(glb: &[u8]) -> Result<(Vec<u8>, Vec<u8>), Box<dyn Error>> {
     let mut json: serde_json::Value = serde_json::from_slice(&glb[20..20 + length])?;
     json["buffers"][0]["uri"] = "cloth.bin".into();
     Ok((json.to_string().into_bytes(), glb[28 + length..].to_vec()))
+}
+
+/// The mesh as OBJ, with relative indices and a mark like darn's.
+fn obj(mesh: &PlainMesh) -> Vec<u8> {
+    let mut text = String::from("mtllib cloth.mtl\nusemtl linen\n");
+    for ([x, y, z], [u, v]) in mesh.positions.iter().zip(&mesh.texcoords) {
+        text += &format!("v {x} {y} {z} 0.5 0.5 1\nvt {u} {v}\n");
+    }
+    let count = mesh.positions.len() as i64;
+    for face in &mesh.faces {
+        let [a, b, c] = face.map(|v| i64::from(v) + 1);
+        text += &format!("f {a}/{a} {b}/{b} {}/{c}\n", c - count - 1);
+    }
+    text += "\n# darn: reconstructed cloth; without the lines from here to the end the file is as it was. Patches: 1, \
+        SHA-256 of the file before: 00\nv 0 0 1\nf 1 2 -1\n# darn: end of the reconstructed cloth\n";
+    text.into_bytes()
+}
+
+/// The mesh as PLY, with a property that darn does not know and a comment like darn's.
+fn ply(mesh: &PlainMesh, ascii: bool) -> Vec<u8> {
+    let mut bytes = format!(
+        "ply\nformat {} 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n\
+         element face {}\nproperty list uchar int vertex_indices\ncomment darn: reconstructed cloth, 1 patches: 0 vertices in bytes 0..0, \
+         0 faces in bytes 0..0, of a body of 9, SHA-256 of the file before: 00\nend_header\n",
+        if ascii { "ascii" } else { "binary_little_endian" },
+        mesh.positions.len(),
+        mesh.faces.len()
+    )
+    .into_bytes();
+    for [x, y, z] in &mesh.positions {
+        if ascii {
+            bytes.extend(format!("{x} {y} {z} 7\n").bytes());
+        } else {
+            bytes.extend([x, y, z].into_iter().flat_map(|x| x.to_le_bytes()));
+            bytes.push(7);
+        }
+    }
+    for [a, b, c] in &mesh.faces {
+        if ascii {
+            bytes.extend(format!("3 {a} {b} {c}\n").bytes());
+        } else {
+            bytes.push(3);
+            bytes.extend([a, b, c].into_iter().flat_map(|v| v.to_le_bytes()));
+        }
+    }
+    bytes
 }
 
 /// A wave of 9 × 9 vertices.
