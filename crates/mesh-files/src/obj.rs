@@ -37,7 +37,7 @@ pub struct ObjFile {
     last_material: Option<String>,
 }
 
-/// Whether the first line that says something begins as one of an OBJ, and all of its first bytes are text.
+/// Whether the first line that is no comment begins as one of an OBJ, and all of the first bytes are text.
 pub fn looks_like_one(bytes: &[u8]) -> bool {
     let head = bytes.get(..LOOKED_AT).unwrap_or(bytes);
     let head = head.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(head);
@@ -45,10 +45,14 @@ pub fn looks_like_one(bytes: &[u8]) -> bool {
         return false;
     }
     let lines = head.split(|byte| matches!(byte, b'\n' | b'\r'));
-    let said = lines.filter_map(|line| words(line).next());
-    // Comments are no evidence by themselves.
-    let mut first = said.skip_while(|word| word.starts_with(b"#"));
-    first.next().is_some_and(|word| KEYWORDS.contains(&word))
+    let mut said = lines
+        .map(<[u8]>::trim_ascii)
+        .filter(|line| !line.is_empty() && !line.starts_with(b"#"));
+    // A word alone is no evidence: `g` may be the start of anything.
+    said.next().is_some_and(|line| {
+        let mut words = words(line);
+        words.next().is_some_and(|word| KEYWORDS.contains(&word)) && words.next().is_some()
+    })
 }
 
 /// Reads an OBJ.
