@@ -259,6 +259,8 @@ fn other_files_are_no_mesh_files() {
         b"# a note\n",
         b"plywood",
         b"v\0 1 2 3",
+        b"g",
+        b"v\n",
     ] {
         assert_eq!(MeshFormat::of(bytes), None, "{bytes:?}");
     }

@@ -95,10 +95,11 @@ fn begins_as_obj(text: &[u8]) -> bool {
     let mut said = lines
         .map(<[u8]>::trim_ascii)
         .filter(|line| !line.is_empty() && !line.starts_with(b"#"));
-    let word = said
-        .next()
-        .and_then(|line| line.split(u8::is_ascii_whitespace).next());
-    word.is_some_and(|word| OBJ_WORDS.contains(&word))
+    // A word alone is no evidence: `g` may be the start of anything.
+    said.next().is_some_and(|line| {
+        let mut words = line.splitn(2, u8::is_ascii_whitespace);
+        words.next().is_some_and(|word| OBJ_WORDS.contains(&word)) && words.next().is_some()
+    })
 }
 
 /// A zip of a scan and the files that it refers to, by their URIs, stored as they are. It goes no further than to the mender.
@@ -179,6 +180,8 @@ mod tests {
             b"plywood",
             b"# only a note",
             b"very well",
+            b"g",
+            b"v\n",
         ] {
             assert!(!looks_like_a_scan(other), "{other:?}");
         }
