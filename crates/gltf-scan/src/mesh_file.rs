@@ -95,6 +95,11 @@ fn container(format: MeshFormat) -> Container {
     }
 }
 
+/// Bytes of memory a triangle while a mesh becomes a glTF: each of its corners may be a vertex of its own.
+const CONVERTED: usize = 350;
+/// Nanoseconds of work a triangle of that.
+const FACE_WORK: u64 = 500;
+
 /// Reads a scan from a mesh file.
 ///
 /// # Errors
@@ -107,6 +112,7 @@ pub(super) fn read_mesh_file(
     let limits = MeshFileLimits {
         max_vertices: allowance.limits.max_vertices,
         max_faces: allowance.limits.max_faces,
+        max_materials: allowance.limits.max_primitives,
     };
     let budget = allowance.budget;
     let file = MeshFile::read(bytes, format, limits, budget)?;
@@ -115,12 +121,16 @@ pub(super) fn read_mesh_file(
         let content = SceneContent::default();
         return Err(ScanError::NoTriangles { content });
     }
+    let faces: usize = mesh.groups.iter().map(|group| group.faces.len()).sum();
+    budget.hold(CONVERTED * faces)?;
+    budget.spend_at_once(FACE_WORK * faces as u64)?;
     let as_gltf = MeshAsGltf::of(mesh).ok_or(MeshFileError::Limit {
         what: "bytes as a glTF",
         limit: "GLB length",
         allowed: u32::MAX as usize,
         found: u32::MAX as usize,
     })?;
+    budget.release(CONVERTED * faces);
     budget.hold(as_gltf.glb.len())?;
     let companions = Companions::Siblings(Siblings::default());
     let mut scan = read_files(as_gltf.glb.into(), companions, allowance)?;

@@ -18,6 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let limits = MeshFileLimits {
         max_vertices: usize::MAX,
         max_faces: usize::MAX,
+        max_materials: usize::MAX,
     };
     let file = MeshFile::read(bytes.into(), format, limits, Budget::unlimited())?;
     println!(

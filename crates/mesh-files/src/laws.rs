@@ -12,6 +12,7 @@ use crate::{
 const LIMITS: MeshFileLimits = MeshFileLimits {
     max_vertices: 1000,
     max_faces: 1000,
+    max_materials: 100,
 };
 const DIGEST: &str = "00ff";
 
@@ -191,9 +192,10 @@ fn indices_count_from_the_first_or_back_from_the_last() {
 
 #[test]
 fn errors_name_the_line_and_what_is_wrong() {
-    let cases: [(&[u8], &str); 9] = [
+    let cases: [(&[u8], &str); 10] = [
         (b"v 0 0 0\nf 1 2 3\n", "line 2: \"2\": there is no v 2; 1 come before"),
         (b"v 0 0 0\nf 0 1 1\n", "line 2: \"0\": there is no v 0; 1 come before"),
+        (b"v 0 -2e31 0\n", "line 1: -2e31 is beyond 1e30"),
         (b"v 0 nan 0\n", "line 1: \"nan\" is no finite number"),
         (b"v 0 0\n", "line 1: has 2 of at least 3 numbers"),
         (b"v 0 0 0\nf 1 1\n", "line 2: a face has 2 corners; it needs three"),
@@ -227,7 +229,8 @@ fn a_point_cloud_is_refused_by_name() {
 fn limits_are_named() {
     let limits = MeshFileLimits {
         max_vertices: 3,
-        max_faces: 1,
+        max_faces: 2,
+        max_materials: 1,
     };
     for (bytes, expected) in [
         (
@@ -239,8 +242,12 @@ fn limits_are_named() {
             "the file has 8 vertices; the limit max_vertices = 3",
         ),
         (
-            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3 1\n".to_vec(),
-            "the file has 2 triangles; the limit max_faces = 1",
+            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3 1 2 3 1 2\n".to_vec(),
+            "the file has 3 triangles; the limit max_faces = 2",
+        ),
+        (
+            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\n".to_vec(),
+            "the file has 2 materials; the limit max_primitives = 1",
         ),
     ] {
         let format = MeshFormat::of(&bytes).unwrap();

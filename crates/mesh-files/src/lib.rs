@@ -66,6 +66,8 @@ pub struct MeshFileLimits {
     pub max_vertices: usize,
     /// Triangles; a polygon counts as the triangles that it is cut into.
     pub max_faces: usize,
+    /// Materials.
+    pub max_materials: usize,
 }
 
 /// A mesh file that was read.

@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use crate::error::MeshFileError;
+
 /// A mesh as its file has it: the numbers of vertices, texture coordinates and normals are the file's, from 0.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FileMesh {
@@ -48,22 +50,50 @@ impl FileMesh {
     }
 }
 
+/// Largest coordinate that is read: differences of two are floats of 32 bits.
+pub(crate) const LARGEST: f64 = 1e30;
+
 /// The groups of a mesh by their materials.
-#[derive(Default)]
-pub(crate) struct Groups(HashMap<Option<String>, usize>);
+pub(crate) struct Groups {
+    by_material: HashMap<Option<String>, usize>,
+    most: usize,
+}
 
 impl Groups {
+    /// No groups yet, and at most so many.
+    pub fn up_to(most: usize) -> Self {
+        Groups {
+            by_material: HashMap::new(),
+            most,
+        }
+    }
+
     /// The index of a material's group, which is new if none has it yet.
-    pub fn of(&mut self, material: Option<&str>, mesh: &mut FileMesh) -> usize {
+    ///
+    /// # Errors
+    /// `Limit`.
+    pub fn of(
+        &mut self,
+        material: Option<&str>,
+        mesh: &mut FileMesh,
+    ) -> Result<usize, MeshFileError> {
         let material = material.map(str::to_owned);
         let next = mesh.groups.len();
-        let group = *self.0.entry(material.clone()).or_insert(next);
+        let group = *self.by_material.entry(material.clone()).or_insert(next);
         if group == next {
+            if next == self.most {
+                return Err(MeshFileError::Limit {
+                    what: "materials",
+                    limit: "max_primitives",
+                    allowed: self.most,
+                    found: next + 1,
+                });
+            }
             mesh.groups.push(FaceGroup {
                 material,
                 faces: Vec::new(),
             });
         }
-        group
+        Ok(group)
     }
 }

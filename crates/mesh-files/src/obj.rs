@@ -7,7 +7,7 @@ use darn_budget::{Budget, Steps};
 
 use crate::added::AddedPatch;
 use crate::error::MeshFileError;
-use crate::mesh::{Corner, FileMesh, Groups};
+use crate::mesh::{Corner, FileMesh, Groups, LARGEST};
 use crate::text::{decimals, finite, number, shown, words};
 use crate::{MeshFileLimits, Unpatched};
 
@@ -19,7 +19,7 @@ const KEYWORDS: [&[u8]; 15] = [
 /// Bytes of a file that are looked at to tell whether it is an OBJ.
 const LOOKED_AT: usize = 4096;
 /// Nanoseconds of work a byte.
-const BYTE_WORK: u64 = 4;
+const BYTE_WORK: u64 = 20;
 /// Bytes of memory for a byte of a file: `f 1 1 1` is a triangle.
 const HELD: usize = 6;
 /// The first line of what darn adds, up to the number of patches.
@@ -68,7 +68,7 @@ pub fn read(
         mesh: FileMesh::default(),
         material: None,
         group: None,
-        groups: Groups::default(),
+        groups: Groups::up_to(limits.max_materials),
         limits,
         faces: 0,
         line: 0,
@@ -184,7 +184,10 @@ impl ObjReader {
                 found,
             });
         }
-        let position = self.numbers(&mut words, 3)?;
+        let position: [f64; 3] = self.numbers(&mut words, 3)?;
+        if let Some(far) = position.iter().find(|x| x.abs() > LARGEST) {
+            return Err(self.error(format!("{far:e} is beyond {LARGEST:e}")));
+        }
         self.mesh.positions.push(position);
         let rest: Vec<&[u8]> = words.take(5).collect();
         if rest.len() >= 3 {
@@ -199,9 +202,10 @@ impl ObjReader {
 
     fn face<'l>(&mut self, words: impl Iterator<Item = &'l [u8]>) -> Result<(), MeshFileError> {
         let words = words.take_while(|word| !word.starts_with(b"#"));
-        let corners: Vec<Corner> = words
-            .map(|word| self.corner(word))
-            .collect::<Result<_, _>>()?;
+        // One more than may be is enough to say so.
+        let most = (self.limits.max_faces - self.faces).saturating_add(3);
+        let corners = words.take(most).map(|word| self.corner(word));
+        let corners: Vec<Corner> = corners.collect::<Result<_, _>>()?;
         if corners.len() < 3 {
             let detail = format!("a face has {} corners; it needs three", corners.len());
             return Err(self.error(detail));
@@ -219,7 +223,7 @@ impl ObjReader {
             Some(group) => group,
             None => {
                 let material = self.material.as_deref();
-                self.groups.of(material, &mut self.mesh)
+                self.groups.of(material, &mut self.mesh)?
             }
         };
         self.group = Some(group);

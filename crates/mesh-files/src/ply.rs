@@ -7,7 +7,7 @@ use darn_budget::{Budget, Steps};
 
 use crate::MeshFileLimits;
 use crate::error::MeshFileError;
-use crate::mesh::{Corner, FileMesh, Groups};
+use crate::mesh::{Corner, FileMesh, Groups, LARGEST};
 use crate::ply_header::{Element, Header, header};
 use crate::ply_rows::RowReader;
 
@@ -143,7 +143,7 @@ pub fn read(
         rows: RowReader::new(&bytes, header.encoding, header.body),
         mesh: FileMesh::default(),
         limits,
-        groups: Groups::default(),
+        groups: Groups::up_to(limits.max_materials),
         faces: 0,
         vertices: &vertices,
         of_faces: &faces,
@@ -241,8 +241,10 @@ impl PlyReader<'_> {
         let (at, mesh) = (self.vertices, &mut self.mesh);
         let number = |property: usize| of(property).first().copied().unwrap_or_default();
         let position = at.position.map(number);
-        if !position.iter().all(|x| x.is_finite()) {
-            return Err(error(element, row, "a coordinate is not finite"));
+        // So compared, NaN is none.
+        if !position.iter().all(|x| x.abs() <= LARGEST) {
+            let detail = format!("a coordinate is not finite or beyond {LARGEST:e}");
+            return Err(error(element, row, detail));
         }
         mesh.positions.push(position);
         if let Some(normal) = at.normal {
@@ -317,7 +319,7 @@ impl PlyReader<'_> {
             .map(corner)
             .collect::<Result<_, MeshFileError>>()?;
         let texture = at.texture.and_then(|k| of(k).first()).map(f64::to_string);
-        let group = self.groups.of(texture.as_deref(), &mut self.mesh);
+        let group = self.groups.of(texture.as_deref(), &mut self.mesh)?;
         let fan = corners
             .windows(2)
             .skip(1)
