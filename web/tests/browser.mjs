@@ -49,9 +49,19 @@ export async function startService(settings = []) {
   return { url: `http://${address}/`, stop: () => child.kill('SIGTERM') };
 }
 
-export function startBrowser() {
+/** Times that a browser may crash before its first page. */
+const CRASHES = 2;
+
+export async function startBrowser() {
   const executablePath = process.env.DARN_CHROMIUM ?? '/usr/bin/chromium';
-  return chromium.launch({ executablePath, args: FLAGS });
+  for (let crashes = 0; ; crashes += 1) {
+    try {
+      return await chromium.launch({ executablePath, args: FLAGS });
+    } catch (error) {
+      // Chromium crashed once in some fifty launches here (SIGSEGV), which says nothing about the editor.
+      if (crashes === CRASHES) throw error;
+    }
+  }
 }
 
 /** A page with the editor, and everything that must not happen on it. */

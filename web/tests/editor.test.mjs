@@ -12,7 +12,8 @@ let browser;
 let service;
 
 before(async () => {
-  [browser, service] = await Promise.all([startBrowser(), startService()]);
+  service = await startService();
+  browser = await startBrowser();
 });
 
 after(async () => {
