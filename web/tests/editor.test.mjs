@@ -298,7 +298,7 @@ inEditor('a scan that is too large is not sent', async (editor, page) => {
     Object.defineProperty(file, 'size', { value: 1e12 });
     return document.querySelector('darn-editor').editor.open(file, 'huge.glb');
   });
-  assert.match(await page.getByRole('alert').textContent(), /at most 134217728/);
+  assert.match(await page.getByRole('alert').textContent(), /at most 536870912/);
   assert.equal(sent, 0);
 });
 
