@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use crate::MeshFileLimits;
 use crate::error::MeshFileError;
 
 /// A mesh as its file has it: the numbers of vertices, texture coordinates and normals are the file's, from 0.
@@ -53,47 +54,112 @@ impl FileMesh {
 /// Largest coordinate that is read: differences of two are floats of 32 bits.
 pub(crate) const LARGEST: f64 = 1e30;
 
-/// The groups of a mesh by their materials.
-pub(crate) struct Groups {
-    by_material: HashMap<Option<String>, usize>,
-    most: usize,
+/// A mesh that is read, within its limits.
+pub(crate) struct MeshBuilder {
+    /// The mesh so far.
+    pub mesh: FileMesh,
+    limits: MeshFileLimits,
+    /// Triangles so far.
+    faces: usize,
+    group_of: HashMap<Option<String>, usize>,
+    /// The group of the last polygon: mostly that of the next one, too.
+    last_group: usize,
 }
 
-impl Groups {
-    /// No groups yet, and at most so many.
-    pub fn up_to(most: usize) -> Self {
-        Groups {
-            by_material: HashMap::new(),
-            most,
+impl MeshBuilder {
+    /// Nothing read yet.
+    pub fn new(limits: MeshFileLimits) -> Self {
+        MeshBuilder {
+            mesh: FileMesh::default(),
+            limits,
+            faces: 0,
+            group_of: HashMap::new(),
+            last_group: 0,
         }
     }
 
-    /// The index of a material's group, which is new if none has it yet.
+    /// Checks a number of vertices.
     ///
     /// # Errors
     /// `Limit`.
-    pub fn of(
+    pub fn check_vertices(&self, found: usize) -> Result<(), MeshFileError> {
+        limited("vertices", "max_vertices", self.limits.max_vertices, found)
+    }
+
+    /// The fewest corners of a polygon that there is no room for any more.
+    pub fn too_many_corners(&self) -> usize {
+        (self.limits.max_faces - self.faces).saturating_add(3)
+    }
+
+    /// Counts the triangles of a polygon of so many corners; there are none of fewer than three.
+    ///
+    /// # Errors
+    /// `Limit`.
+    pub fn count_polygon(&mut self, corners: usize) -> Result<(), MeshFileError> {
+        self.faces += corners.saturating_sub(2);
+        limited("triangles", "max_faces", self.limits.max_faces, self.faces)
+    }
+
+    /// Adds the triangles of a polygon that was counted, as a fan.
+    ///
+    /// # Errors
+    /// `Limit` for a material too many.
+    pub fn push_polygon(
         &mut self,
         material: Option<&str>,
-        mesh: &mut FileMesh,
-    ) -> Result<usize, MeshFileError> {
+        corners: &[Corner],
+    ) -> Result<(), MeshFileError> {
+        let [first, rest @ ..] = corners else {
+            return Ok(());
+        };
+        if rest.len() < 2 {
+            return Ok(());
+        }
+        let group = self.group(material)?;
+        let fan = rest.windows(2).map(|pair| [*first, pair[0], pair[1]]);
+        self.mesh.groups[group].faces.extend(fan);
+        Ok(())
+    }
+
+    /// The index of a material's group, which is new if none has it yet.
+    fn group(&mut self, material: Option<&str>) -> Result<usize, MeshFileError> {
+        let last = self.mesh.groups.get(self.last_group);
+        if last.is_some_and(|group| group.material.as_deref() == material) {
+            return Ok(self.last_group);
+        }
         let material = material.map(str::to_owned);
-        let next = mesh.groups.len();
-        let group = *self.by_material.entry(material.clone()).or_insert(next);
+        let next = self.mesh.groups.len();
+        let group = *self.group_of.entry(material.clone()).or_insert(next);
         if group == next {
-            if next == self.most {
-                return Err(MeshFileError::Limit {
-                    what: "materials",
-                    limit: "max_primitives",
-                    allowed: self.most,
-                    found: next + 1,
-                });
-            }
-            mesh.groups.push(FaceGroup {
+            limited(
+                "materials",
+                "max_primitives",
+                self.limits.max_materials,
+                next + 1,
+            )?;
+            self.mesh.groups.push(FaceGroup {
                 material,
                 faces: Vec::new(),
             });
         }
+        self.last_group = group;
         Ok(group)
     }
+}
+
+fn limited(
+    what: &'static str,
+    limit: &'static str,
+    allowed: usize,
+    found: usize,
+) -> Result<(), MeshFileError> {
+    if found <= allowed {
+        return Ok(());
+    }
+    Err(MeshFileError::Limit {
+        what,
+        limit,
+        allowed,
+        found,
+    })
 }

@@ -1,13 +1,11 @@
 //! Wavefront OBJ.
 
-use std::io::Write as _;
-
 use bytes::Bytes;
 use darn_budget::{Budget, Steps};
 
 use crate::added::AddedPatch;
 use crate::error::MeshFileError;
-use crate::mesh::{Corner, FileMesh, Groups, LARGEST};
+use crate::mesh::{Corner, FileMesh, LARGEST, MeshBuilder};
 use crate::text::{decimals, finite, number, shown, words};
 use crate::{MeshFileLimits, Unpatched};
 
@@ -65,12 +63,8 @@ pub fn read(
     budget: &Budget<'_>,
 ) -> Result<(FileMesh, ObjFile), MeshFileError> {
     let mut reader = ObjReader {
-        mesh: FileMesh::default(),
+        builder: MeshBuilder::new(limits),
         material: None,
-        group: None,
-        groups: Groups::up_to(limits.max_materials),
-        limits,
-        faces: 0,
         line: 0,
     };
     budget.hold(HELD * bytes.len())?;
@@ -91,29 +85,22 @@ pub fn read(
             reader.read(&std::mem::take(&mut joined))?;
         }
     }
-    let ObjReader {
-        mut mesh, material, ..
-    } = reader;
-    mesh.groups.retain(|group| !group.faces.is_empty());
+    let mut mesh = reader.builder.mesh;
     // Colours count where every vertex has one.
     if mesh.colours.len() != mesh.positions.len() {
         mesh.colours.clear();
     }
     let file = ObjFile {
         bytes,
-        last_material: material,
+        last_material: reader.material,
     };
     Ok((mesh, file))
 }
 
 struct ObjReader {
-    mesh: FileMesh,
+    builder: MeshBuilder,
+    /// The material in use.
     material: Option<String>,
-    /// The group of that material, once a face has it.
-    group: Option<usize>,
-    groups: Groups,
-    limits: MeshFileLimits,
-    faces: usize,
     line: usize,
 }
 
@@ -124,12 +111,12 @@ impl ObjReader {
             Some(b"v") => self.vertex(words),
             Some(b"vt") => {
                 let [u, v] = self.numbers(&mut words, 1)?;
-                self.mesh.texcoords.push([u, v]);
+                self.builder.mesh.texcoords.push([u, v]);
                 Ok(())
             }
             Some(b"vn") => {
                 let normal = self.numbers(&mut words, 3)?;
-                self.mesh.normals.push(normal);
+                self.builder.mesh.normals.push(normal);
                 Ok(())
             }
             Some(b"f" | b"fo") => self.face(words),
@@ -137,7 +124,6 @@ impl ObjReader {
                 let name = line.trim_ascii().get(b"usemtl".len()..).unwrap_or_default();
                 let name = String::from_utf8_lossy(name.trim_ascii());
                 self.material = Some(name.into_owned());
-                self.group = None;
                 Ok(())
             }
             _ => Ok(()),
@@ -175,25 +161,19 @@ impl ObjReader {
         &mut self,
         mut words: impl Iterator<Item = &'l [u8]>,
     ) -> Result<(), MeshFileError> {
-        let found = self.mesh.positions.len() + 1;
-        if found > self.limits.max_vertices {
-            return Err(MeshFileError::Limit {
-                what: "vertices",
-                limit: "max_vertices",
-                allowed: self.limits.max_vertices,
-                found,
-            });
-        }
+        self.builder
+            .check_vertices(self.builder.mesh.positions.len() + 1)?;
         let position: [f64; 3] = self.numbers(&mut words, 3)?;
         if let Some(far) = position.iter().find(|x| x.abs() > LARGEST) {
             return Err(self.error(format!("{far:e} is beyond {LARGEST:e}")));
         }
-        self.mesh.positions.push(position);
+        self.builder.mesh.positions.push(position);
         let rest: Vec<&[u8]> = words.take(5).collect();
         if rest.len() >= 3 {
             let [r, g, b, a] = self.numbers(&mut rest.iter().copied(), 3)?;
             let alpha = if rest.len() > 3 { a } else { 1.0 };
-            self.mesh
+            self.builder
+                .mesh
                 .colours
                 .push([r, g, b, alpha].map(|x: f64| x as f32));
         }
@@ -203,36 +183,16 @@ impl ObjReader {
     fn face<'l>(&mut self, words: impl Iterator<Item = &'l [u8]>) -> Result<(), MeshFileError> {
         let words = words.take_while(|word| !word.starts_with(b"#"));
         // One more than may be is enough to say so.
-        let most = (self.limits.max_faces - self.faces).saturating_add(3);
+        let most = self.builder.too_many_corners();
         let corners = words.take(most).map(|word| self.corner(word));
         let corners: Vec<Corner> = corners.collect::<Result<_, _>>()?;
         if corners.len() < 3 {
             let detail = format!("a face has {} corners; it needs three", corners.len());
             return Err(self.error(detail));
         }
-        self.faces += corners.len() - 2;
-        if self.faces > self.limits.max_faces {
-            return Err(MeshFileError::Limit {
-                what: "triangles",
-                limit: "max_faces",
-                allowed: self.limits.max_faces,
-                found: self.faces,
-            });
-        }
-        let group = match self.group {
-            Some(group) => group,
-            None => {
-                let material = self.material.as_deref();
-                self.groups.of(material, &mut self.mesh)?
-            }
-        };
-        self.group = Some(group);
-        let fan = corners
-            .windows(2)
-            .skip(1)
-            .map(|pair| [corners[0], pair[0], pair[1]]);
-        self.mesh.groups[group].faces.extend(fan);
-        Ok(())
+        self.builder.count_polygon(corners.len())?;
+        self.builder
+            .push_polygon(self.material.as_deref(), &corners)
     }
 
     /// `v`, `v/vt`, `v//vn` or `v/vt/vn`.
@@ -258,9 +218,9 @@ impl ObjReader {
                 }
             }
         };
-        let position = index("v", self.mesh.positions.len())?;
-        let texcoord = index("vt", self.mesh.texcoords.len())?;
-        let normal = index("vn", self.mesh.normals.len())?;
+        let position = index("v", self.builder.mesh.positions.len())?;
+        let texcoord = index("vt", self.builder.mesh.texcoords.len())?;
+        let normal = index("vn", self.builder.mesh.normals.len())?;
         let position = position.ok_or_else(|| self.error(format!("{} names no v", shown(word))))?;
         Ok(Corner {
             position,
@@ -274,7 +234,7 @@ impl ObjFile {
     /// The file with the patches as lines at its end.
     pub fn with_patches(&self, mesh: &FileMesh, patches: &[AddedPatch], sha256: &str) -> Vec<u8> {
         let mut out = self.bytes.to_vec();
-        // Its own last line may have no end; the block takes the line break out again with it.
+        // The file's last line may have no end. This line break is the block's, and goes when the block goes.
         let mut writer = ObjWriter {
             vertices: mesh.positions.len() as u32,
             texcoords: mesh.texcoords.len(),
@@ -290,8 +250,7 @@ impl ObjFile {
             writer.patch(patch);
         }
         writer.line(format_args!("{END}"));
-        // Writing to a vector does not fail.
-        out.write_all(writer.out.as_bytes()).ok();
+        out.extend_from_slice(writer.out.as_bytes());
         out
     }
 }

@@ -7,7 +7,7 @@ use darn_budget::{Budget, Steps};
 
 use crate::MeshFileLimits;
 use crate::error::MeshFileError;
-use crate::mesh::{Corner, FileMesh, Groups, LARGEST};
+use crate::mesh::{Corner, FileMesh, LARGEST, MeshBuilder};
 use crate::ply_header::{Element, Header, header};
 use crate::ply_rows::RowReader;
 
@@ -130,21 +130,12 @@ pub fn read(
         MeshFileError::line(line, detail)
     })?;
     let count = header.elements[vertices.element].rows;
-    if count > limits.max_vertices {
-        return Err(MeshFileError::Limit {
-            what: "vertices",
-            limit: "max_vertices",
-            allowed: limits.max_vertices,
-            found: count,
-        });
-    }
+    let builder = MeshBuilder::new(limits);
+    builder.check_vertices(count)?;
     budget.hold(HELD * bytes.len())?;
     let mut reader = PlyReader {
         rows: RowReader::new(&bytes, header.encoding, header.body),
-        mesh: FileMesh::default(),
-        limits,
-        groups: Groups::up_to(limits.max_materials),
-        faces: 0,
+        builder,
         vertices: &vertices,
         of_faces: &faces,
         vertex_count: count,
@@ -156,8 +147,7 @@ pub fn read(
         reader.element(index, element, &mut steps)?;
         rows.push(start..reader.rows.at);
     }
-    let mut mesh = reader.mesh;
-    mesh.groups.retain(|group| !group.faces.is_empty());
+    let mesh = reader.builder.mesh;
     let file = PlyFile {
         bytes,
         header,
@@ -170,10 +160,7 @@ pub fn read(
 
 struct PlyReader<'r> {
     rows: RowReader<'r>,
-    mesh: FileMesh,
-    limits: MeshFileLimits,
-    groups: Groups,
-    faces: usize,
+    builder: MeshBuilder,
     vertices: &'r VertexProperties,
     of_faces: &'r FaceProperties,
     /// How many vertices there are, whether they come before the faces or after them.
@@ -238,7 +225,7 @@ impl PlyReader<'_> {
         row: usize,
         of: impl Fn(usize) -> &'n [f64],
     ) -> Result<(), MeshFileError> {
-        let (at, mesh) = (self.vertices, &mut self.mesh);
+        let (at, mesh) = (self.vertices, &mut self.builder.mesh);
         let number = |property: usize| of(property).first().copied().unwrap_or_default();
         let position = at.position.map(number);
         // So compared, NaN is none.
@@ -271,24 +258,16 @@ impl PlyReader<'_> {
     ) -> Result<(), MeshFileError> {
         let at = self.of_faces;
         let corners = of(at.vertices);
-        // Faces of fewer corners are lines and points.
-        self.faces += corners.len().saturating_sub(2);
-        if self.faces > self.limits.max_faces {
-            return Err(MeshFileError::Limit {
-                what: "triangles",
-                limit: "max_faces",
-                allowed: self.limits.max_faces,
-                found: self.faces,
-            });
-        }
+        self.builder.count_polygon(corners.len())?;
         let of_corners = at
             .texcoords
             .map(&of)
             .filter(|all| all.len() == 2 * corners.len());
-        let first = self.mesh.texcoords.len() as u32;
+        let first = self.builder.mesh.texcoords.len() as u32;
         if let Some(all) = of_corners {
             let (pairs, _) = all.as_chunks::<2>();
-            self.mesh
+            self.builder
+                .mesh
                 .texcoords
                 .extend(pairs.iter().map(|uv| uv.map(finite_or_zero)));
         }
@@ -319,13 +298,7 @@ impl PlyReader<'_> {
             .map(corner)
             .collect::<Result<_, MeshFileError>>()?;
         let texture = at.texture.and_then(|k| of(k).first()).map(f64::to_string);
-        let group = self.groups.of(texture.as_deref(), &mut self.mesh)?;
-        let fan = corners
-            .windows(2)
-            .skip(1)
-            .map(|pair| [corners[0], pair[0], pair[1]]);
-        self.mesh.groups[group].faces.extend(fan);
-        Ok(())
+        self.builder.push_polygon(texture.as_deref(), &corners)
     }
 }
 
