@@ -475,10 +475,7 @@ impl<'d, 'a> ScanReader<'d, 'a> {
             }
             None => {
                 self.count_faces(mode, vertices, &place.pointer)?;
-                let mut list = IndexList::zeros(vertices);
-                let slots = list.indices_mut().iter_mut();
-                slots.zip(0..).for_each(|(slot, index)| *slot = index);
-                list
+                IndexList::counting(vertices)
             }
         };
         Ok(indices.triangles(mode))

@@ -21,6 +21,14 @@ impl IndexList {
         }
     }
 
+    /// 0, 1, 2, …, so many, without a restart.
+    pub fn counting(count: usize) -> Self {
+        let mut list = Self::zeros(count);
+        let slots = list.indices_mut().iter_mut();
+        slots.zip(0..).for_each(|(slot, index)| *slot = index);
+        list
+    }
+
     /// The indices.
     pub fn indices(&self) -> &[u32] {
         &self.triples.as_flattened()[..self.count]

@@ -92,13 +92,7 @@ fn of_hole(scan: &TestScan, number: usize, task: &Task) -> Result<Filled, Box<dy
     let own_seconds = begin.elapsed().as_secs_f64();
     let raster = ClothRaster::new(&completion);
     let picture = Picture::new(&raster);
-    let byte = |x: f32| (255.0 * x + 0.5) as u8;
-    let truth: Vec<[u8; 4]> = (completion.places().into_iter())
-        .map(|p| {
-            let [r, g, b] = scan.truth(p).map(byte);
-            [r, g, b, 255]
-        })
-        .collect();
+    let truth = scan.truth_texels(&completion.places());
     let [hole, known] = completion.masks();
     let scores = |made: &[[u8; 4]]| {
         let comparison = Comparison {

@@ -77,13 +77,7 @@ impl Trial {
         let completion = Completion::new(&cloth, &scan.patch, &Settings::default(), budget)?;
         let PatchTexture { width, layers, .. } = completion.texture(budget)?;
         let texture = layers.into_iter().next().unwrap_or_default();
-        let byte = |x: f32| (255.0 * x + 0.5) as u8;
-        let truth: Vec<[u8; 4]> = (completion.places().into_iter())
-            .map(|p| {
-                let [r, g, b] = scan.truth(p).map(byte);
-                [r, g, b, 255]
-            })
-            .collect();
+        let truth = scan.truth_texels(&completion.places());
         let peers = [Peer::Continue, Peer::Average].map(|peer| continued(scan, peer));
         let image = |k: usize| completion.continued_image(&peers[k], budget);
         let made = [texture, image(0)?, image(1)?];

@@ -251,6 +251,16 @@ impl TestScan {
         self.swatch.colour(p.map(|x| x as f32))
     }
 
+    /// The colours of the cloth at places of the sheet as texels.
+    pub fn truth_texels(&self, places: &[[f64; 2]]) -> Vec<[u8; 4]> {
+        let byte = |x: f32| (255.0 * x + 0.5) as u8;
+        let texel = |p: &[f64; 2]| {
+            let [r, g, b] = self.truth(*p).map(byte);
+            [r, g, b, 255]
+        };
+        places.iter().map(texel).collect()
+    }
+
     fn paint(&mut self, islands: &[Island], texels: &[[f64; 2]], of_face: &[usize], gutter: usize) {
         let size = SHEET * self.hole as f64;
         let cells = (islands.len() as f64).sqrt().ceil() as usize;
