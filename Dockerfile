@@ -12,9 +12,11 @@ COPY crates/jobs/Cargo.toml crates/jobs/
 COPY crates/json/Cargo.toml crates/json/
 COPY crates/lab/Cargo.toml crates/lab/
 COPY crates/mend/Cargo.toml crates/mend/
+COPY crates/mesh-files/Cargo.toml crates/mesh-files/
 COPY crates/net/Cargo.toml crates/net/
 COPY crates/render/Cargo.toml crates/render/
 COPY crates/serve/Cargo.toml crates/serve/
+COPY crates/texture/Cargo.toml crates/texture/
 COPY scripts/stub-sources scripts/
 RUN scripts/stub-sources && cargo build --release --locked --bin darn && cargo clean --release --workspace
 
