@@ -3,7 +3,7 @@
 
 usage: edit.py SCAN [--url http://127.0.0.1:8080] [--requests 50] [--abandon 0] [--pid PID]
 
-Opens a session, moves a point of the new cloth once a request, searches once a request; prints median and p95. With --abandon opens so many
+Opens a session, moves a point of the new cloth once a request, searches once a request, drags points in small steps; prints median and p95. With --abandon opens so many
 sessions and leaves them, and prints the service's resident memory on the way (--pid).
 """
 import argparse, json, random, statistics, time, urllib.error, urllib.request
@@ -45,7 +45,7 @@ def main():
     here, hole = f"{a.url}/sessions/{session['id']}", session["holes"][0]
     size = max(max(hole["rimPositions"][k::3]) - min(hole["rimPositions"][k::3]) for k in range(3))
     cells = hole["holeCells"]
-    grabs, searches = [], []
+    grabs, moves, drags, searches = [], [], [], []
     for _ in range(a.requests + 2):
         cell = rng.choice(cells)
         uv = [(cell % 64 + 0.5) / 64, (cell // 64 + 0.5) / 64]
@@ -60,6 +60,21 @@ def main():
         query = {"hole": hole["id"], "target": [x + d for x, d in zip(at, offset)]}
         searches.append(ask(here + "/optimize-anchor", json.dumps(query).encode(), "application/json")[0])
     print(told("inpaint with one grab", grabs[2:]))
+    # As the editor drags: a point of the cloth moves on in small steps, each a draft; beside it each a whole answer.
+    for _ in range(max(a.requests // 20, 1)):
+        cell = rng.choice(cells)
+        uv = [(cell % 64 + 0.5) / 64, (cell // 64 + 0.5) / 64]
+        way = [rng.uniform(-0.05, 0.05) * size for _ in range(3)]
+        for step in range(1, 21):
+            grab = {"uv": uv, "offset": [x * step / 20 for x in way]}
+            body = json.dumps({"edits": [{"hole": hole["id"], "grab": grab}]}).encode()
+            try:
+                drags.append(ask(here + "/inpaint?draft=true", body, "application/json")[0])
+                moves.append(ask(here + "/inpaint", body, "application/json", "application/octet-stream")[0])
+            except urllib.error.HTTPError as error:
+                print("refused:", error.read()[:200])
+    print(told("drag, a draft each step", drags[2:]))
+    print(told("drag, patches each step", moves[2:]))
     print(told("optimize-anchor", searches[2:]))
     for k in range(a.abandon):
         ask(a.url + "/sessions", scan, "model/gltf-binary")

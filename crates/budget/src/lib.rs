@@ -4,10 +4,12 @@
 //! Work, memory and output are counted from the input alone, so that the same request is always refused or always answered.
 
 mod memory;
+mod progress;
 mod spares;
 mod work;
 
 pub use memory::{Memory, MemoryPool};
+pub use progress::{Listener, Progress, Stage};
 pub use spares::Spares;
 pub use work::{NANOSECONDS_PER_SECOND, Steps};
 
@@ -67,6 +69,8 @@ pub struct Limits {
     pub output: usize,
     /// The memory that all requests share.
     pub pool: Option<Arc<MemoryPool>>,
+    /// Who is told how far the work is. It bounds nothing.
+    pub listener: Option<Listener>,
 }
 
 impl Default for Limits {
@@ -77,6 +81,7 @@ impl Default for Limits {
             memory: usize::MAX,
             output: usize::MAX,
             pool: None,
+            listener: None,
         }
     }
 }
@@ -97,6 +102,7 @@ static UNLIMITED: Budget<'static> = Budget {
         memory: usize::MAX,
         output: usize::MAX,
         pool: None,
+        listener: None,
     },
     cancelled: &|| false,
     spent: AtomicU64::new(0),
@@ -123,6 +129,11 @@ impl<'a> Budget<'a> {
     /// The limits.
     pub fn limits(&self) -> &Limits {
         &self.limits
+    }
+
+    /// Begins a stage of the work that has so many pieces; 0 where it is one piece.
+    pub fn begin(&self, stage: &'static str, pieces: usize) -> Stage<'_> {
+        Stage::begin(self.limits.listener.as_ref(), stage, pieces)
     }
 
     /// Checks that the answer is still waited for.
@@ -280,6 +291,32 @@ mod tests {
             Err(Exhausted::Cancelled)
         );
         assert_eq!(budget.spend(120_000_000_000), Ok(()));
+    }
+
+    #[test]
+    fn whoever_listens_hears_of_every_piece() {
+        let (tell, heard) = std::sync::mpsc::channel();
+        let limits = Limits {
+            listener: Some(Listener::new(move |progress| tell.send(progress).unwrap())),
+            ..Limits::default()
+        };
+        let budget = budget(limits);
+        let stage = budget.begin("flatten", 2);
+        stage.one_done();
+        stage.one_done();
+        budget.begin("write", 0);
+        let heard: Vec<_> = heard
+            .try_iter()
+            .map(|it| (it.stage, it.done, it.all))
+            .collect();
+        let all = [
+            ("flatten", 0, 2),
+            ("flatten", 1, 2),
+            ("flatten", 2, 2),
+            ("write", 0, 0),
+        ];
+        assert_eq!(heard, all);
+        Budget::unlimited().begin("flatten", 1).one_done();
     }
 
     #[test]

@@ -142,6 +142,14 @@ pub trait EditSession: Send + Sync + 'static {
         budget: &Budget<'_>,
     ) -> Result<Patches, Refusal>;
 
+    /// The patches as a drag shows them, of the holes that [`EditSession::described`] lists: the positions of all vertices, patch after patch, in order of
+    /// hole id, in the order of [`v1::SessionHole::patch_uvs`], then the normals of all vertices in that order, `x, y, z` as little-endian f32. They
+    /// are the vertices of [`EditSession::patches`]; what it measures and reports is left out.
+    ///
+    /// # Errors
+    /// As [`EditSession::patches`].
+    fn draft(&self, constraints: &Constraints, budget: &Budget<'_>) -> Result<Vec<u8>, Refusal>;
+
     /// The whole scan mended with these anchors and edits: the bytes that the stateless [`Mender::inpaint`] returns.
     ///
     /// # Errors

@@ -121,7 +121,7 @@ impl PatchSource<'_> {
         };
         let (dressed, normals) = rayon::join(
             || extend_attributes(&hole.attribute_map(), patch, region, &columns),
-            || normals(patch, region),
+            || vertex_normals_at_seam(patch, region),
         );
         let mut dressed = dressed?;
         if welded.surface.set_aside.near_seam_vertices > 0 {
@@ -274,9 +274,9 @@ fn columns_of(part: &ScanPart, vertex: u32) -> Vec<f64> {
     texcoords.chain(colors).map(f64::from).collect()
 }
 
-/// Normals of the patch's vertices. The scan's triangles around the patch count, too, so that the shading is continuous
-/// at the seam.
-fn normals(patch: &Patch, region: &Region) -> Vec<Vec3> {
+/// Normals of the patch's vertices, of any length above 0. The scan's triangles around the patch count, too, so that the shading is
+/// continuous at the seam.
+pub fn vertex_normals_at_seam(patch: &Patch, region: &Region) -> Vec<Vec3> {
     let all = vertex_normals(&quality::joined(patch, region));
     let inner = region.mesh.positions.len();
     let rim = patch.rim.iter().map(|v| all[*v as usize]);

@@ -9,12 +9,13 @@ use darn_contract::port::{
     EditSession, HolesQuery, Mended, Mender, PatchForm, Patches, Refusal, ScanForm, Stripped,
 };
 use darn_contract::{Constraints, Search, error_chain, v1};
+use darn_geometry::mesh::Vec3;
 use darn_gltf_scan::{Container, Scan};
 
 use crate::error::MendError;
 use crate::formed_scan::formed;
 use crate::mender::{Call, NetworkMender};
-use crate::session::ScanSession;
+use crate::session::{ScanSession, SessionDraft};
 use crate::timings::add_read_time;
 
 /// The scan that the warm-up mends: a real one, small.
@@ -28,6 +29,7 @@ impl SharedMender {
     /// Reads a scan; also returns how long that took.
     fn scan(&self, bytes: Bytes, budget: &Budget) -> Result<(Scan, Duration), Refusal> {
         let started = Instant::now();
+        budget.begin("reading", 0);
         let scan = Scan::read_within(bytes, &self.0.scan_limits, budget)
             .map_err(|error| refusal(MendError::unreadable(error)))?;
         Ok((scan, started.elapsed()))
@@ -164,12 +166,16 @@ impl EditSession for ScanSession {
             PatchForm::Glb => call.glb(constraints).map_err(refusal),
             PatchForm::Positions => {
                 let (positions, report) = call.positions(constraints).map_err(refusal)?;
-                let numbers = positions.iter().flatten().flat_map(|p| [p.x, p.y, p.z]);
-                let bytes = numbers.flat_map(|x| (x as f32).to_le_bytes());
-                Ok((bytes.collect(), report))
+                Ok((packed(positions.iter().flatten()), report))
             }
         })?;
         Ok(Patches { bytes, report })
+    }
+
+    fn draft(&self, constraints: &Constraints, budget: &Budget<'_>) -> Result<Vec<u8>, Refusal> {
+        let draft = (self.pools()).run(budget, || self.call(budget).draft(constraints));
+        let SessionDraft { positions, normals } = draft.map_err(refusal)?;
+        Ok(packed(positions.iter().chain(&normals)))
     }
 
     fn mended(&self, constraints: &Constraints, budget: &Budget<'_>) -> Result<Mended, Refusal> {
@@ -187,6 +193,12 @@ impl EditSession for ScanSession {
         let found = (self.pools()).run(budget, || self.call(budget).optimize_anchor(search));
         found.map_err(refusal)
     }
+}
+
+/// `x, y, z` of each vector as little-endian f32.
+fn packed<'a>(vectors: impl Iterator<Item = &'a Vec3>) -> Vec<u8> {
+    let numbers = vectors.flat_map(|v| [v.x, v.y, v.z]);
+    numbers.flat_map(|x| (x as f32).to_le_bytes()).collect()
 }
 
 /// An error as the port hands it on.

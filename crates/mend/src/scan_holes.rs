@@ -1,6 +1,7 @@
 //! All holes of a scan that a request chose: prepared once, filled for this request and for later ones. A single call
 //! drops them, a session keeps them.
 
+use std::collections::BTreeSet;
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -84,6 +85,7 @@ impl ScanAdditions {
     /// When the patches cannot be written; `Exhausted`.
     fn written(mut self, scan: &Scan, seen: &Scan, call: Call) -> Result<Mended, MendError> {
         let started = Instant::now();
+        call.budget.begin("writing", 0);
         let written = seen.write_within(&self.primitives, call.budget)?;
         self.report.input = Some(digests::message(scan.digests().clone()));
         self.report.output = Some(digests::message(written.digests));
@@ -110,6 +112,7 @@ impl ScanHoles {
         constraints: &Constraints,
         call: Call,
     ) -> Result<ScanHoles, MendError> {
+        call.budget.begin("welding", 0);
         let whole = WeldedScan::of(scan, call.budget)?;
         let (cut, welded) = match CutScan::of(scan, &whole, constraints, call.budget)? {
             Some(CutScan { scan, welded }) => (Some(scan), welded),
@@ -179,13 +182,16 @@ impl ScanHoles {
         let weights = constraints.weights.as_deref();
         let inpainter = Inpainter::choose(&call.mender.networks, weights, constraints.up)?;
         let started = Instant::now();
+        let stage = call.budget.begin("flattening", found);
         let prepare = |request: &HoleRequest| {
             call.budget.check()?;
             let hole = PreparedHole::new(&welded, request.id, call)?;
-            match selection.accept_doubtful || request.is_edited() {
-                true => Ok(hole),
-                false => hole.or_fair(&welded, &inpainter, call),
-            }
+            let hole = match selection.accept_doubtful || request.is_edited() {
+                true => hole,
+                false => hole.or_fair(&welded, &inpainter, call)?,
+            };
+            stage.one_done();
+            Ok(hole)
         };
         let holes: Vec<Result<PreparedHole, MendError>> =
             selection.requests.par_iter().map(prepare).collect();
@@ -222,6 +228,39 @@ impl ScanHoles {
         later: &Constraints,
         call: Call<'a>,
     ) -> Result<FilledScan<'a>, MendError> {
+        let (selection, inpainter) = self.chosen(scan, later, call)?;
+        self.filled_as(&selection, inpainter, call)
+    }
+
+    /// The patches of some holes, with the constraints of a later request, before they are measured. What is doubted is not left here.
+    ///
+    /// # Errors
+    /// As [`ScanHoles::filled_with`].
+    pub fn drafts_of<'a>(
+        &'a self,
+        scan: &Scan,
+        later: &Constraints,
+        holes: &BTreeSet<u32>,
+        call: Call<'a>,
+    ) -> Result<Vec<PatchDraft<'a>>, MendError> {
+        let (selection, inpainter) = self.chosen(scan, later, call)?;
+        let requests = selection.requests.iter();
+        let requests: Vec<&HoleRequest> = requests.filter(|it| holes.contains(&it.id)).collect();
+        let drafts = requests
+            .par_iter()
+            .map(|request| self.draft(request, &inpainter, call));
+        let mut drafts: Vec<PatchDraft> = drafts.collect::<Result<_, _>>()?;
+        separate(&mut drafts, call.budget)?;
+        Ok(drafts)
+    }
+
+    /// What a later request selects, and what fills it.
+    fn chosen<'a>(
+        &'a self,
+        scan: &Scan,
+        later: &Constraints,
+        call: Call<'a>,
+    ) -> Result<(Selection, Inpainter<'a>), MendError> {
         let late: Vec<FieldError> = (later.holes.iter().enumerate())
             .filter_map(|(i, selector)| {
                 let member = match selector {
@@ -244,7 +283,21 @@ impl ScanHoles {
         let weights = later.weights.as_deref().or(self.weights.as_deref());
         let up = later.up.or(self.up);
         let inpainter = Inpainter::choose(&call.mender.networks, weights, up)?;
-        self.filled_as(&selection, inpainter, call)
+        Ok((selection, inpainter))
+    }
+
+    /// Fills one hole as a request asks.
+    fn draft<'a>(
+        &'a self,
+        request: &HoleRequest,
+        inpainter: &Inpainter<'a>,
+        call: Call<'a>,
+    ) -> Result<PatchDraft<'a>, MendError> {
+        call.budget.check()?;
+        match self.opened(request.id)? {
+            PreparedHole::Charted(hole) => HoleContext::new(hole, inpainter, call)?.fill(request),
+            PreparedHole::Fair(hole) => hole.fill(request),
+        }
     }
 
     fn filled_as<'a>(
@@ -254,17 +307,10 @@ impl ScanHoles {
         call: Call<'a>,
     ) -> Result<FilledScan<'a>, MendError> {
         let started = Instant::now();
+        let stage = call.budget.begin("filling", selection.requests.len());
         let drafts = selection.requests.par_iter().map(|request| {
-            call.budget.check()?;
-            match self.opened(request.id)? {
-                PreparedHole::Charted(hole) => {
-                    HoleContext::new(hole, &inpainter, call)?.fill(request)
-                }
-                PreparedHole::Fair(hole) => hole.fill(request),
-            }
-        });
-        let drafts = drafts.map(|draft| {
-            let draft: PatchDraft = draft?;
+            let draft = self.draft(request, &inpainter, call)?;
+            stage.one_done();
             match draft.reasons_to_leave() {
                 doubts if doubts.is_empty() || selection.accept_doubtful => Ok(draft),
                 doubts => Err(draft.left(doubts)),
@@ -368,6 +414,7 @@ impl ScanHoles {
             .collect::<Result<Vec<_>, MendError>>()?;
         let dressed_ms = milliseconds(started);
         let started = Instant::now();
+        call.budget.begin("texturing", 0);
         let colouring = Colouring {
             source,
             choice: texture,

@@ -2,6 +2,9 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
+use crate::addition::vertex_normals_at_seam;
 use crate::call_pools::CallPools;
 use crate::error::MendError;
 use crate::hole_report::FilledHole;
@@ -115,6 +118,15 @@ impl ScanSession {
     }
 }
 
+/// The patches of a session's holes while something is dragged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SessionDraft {
+    /// The vertices of all patches, patch after patch, in order of hole id; scene space.
+    pub positions: Vec<Vec3>,
+    /// Their normals, of any length above 0. At a seam they are those of patch and scan together.
+    pub normals: Vec<Vec3>,
+}
+
 /// A session and what a call to it may cost.
 #[derive(Clone, Copy)]
 pub struct SessionCall<'a> {
@@ -170,6 +182,30 @@ impl<'a> SessionCall<'a> {
         let each = filled.holes.iter();
         let positions = each.map(|hole| hole.patch.positions.clone());
         Ok((positions.collect(), self.session.report(filled)))
+    }
+
+    /// The patches of the session's holes as a drag shows them: not measured, and without a report.
+    ///
+    /// # Errors
+    /// As [`mend`](crate::mend).
+    pub fn draft(&self, constraints: &Constraints) -> Result<SessionDraft, MendError> {
+        let ScanSession {
+            scan,
+            holes,
+            described,
+            ..
+        } = self.session;
+        let listed = described.holes.iter().map(|hole| hole.id).collect();
+        let drafts = holes.drafts_of(scan, constraints, &listed, self.call)?;
+        let each = (drafts.par_iter())
+            .map(|draft| vertex_normals_at_seam(&draft.patch, draft.hole.region()));
+        let normals: Vec<Vec<Vec3>> = each.collect();
+        Ok(SessionDraft {
+            positions: (drafts.into_iter())
+                .flat_map(|draft| draft.patch.positions)
+                .collect(),
+            normals: normals.into_iter().flatten().collect(),
+        })
     }
 
     /// Searches where on a hole's grid a point in space belongs, with the weights of the opening.
@@ -321,6 +357,33 @@ mod tests {
                 _ => panic!("one of the two refused {constraints:?}"),
             }
         }
+    }
+
+    #[test]
+    fn a_draft_has_the_vertices_of_the_patches() {
+        let scan = scan_of(&holed_sheet(24, 0.15));
+        let never = Budget::unlimited();
+        let opening = Constraints::default();
+        let session = ScanSession::open(scan, &opening, Arc::clone(mender()), never).unwrap();
+        let hole = session.described().holes[0].id;
+        let dragged = Constraints {
+            anchors: vec![anchor_at(Some(hole))],
+            edits: vec![grab_at(None)],
+            ..Constraints::default()
+        };
+        for constraints in [opening, dragged] {
+            let call = session.call(never);
+            let draft = call.draft(&constraints).unwrap();
+            let (positions, _) = call.positions(&constraints).unwrap();
+            assert_eq!(draft.positions, positions.concat());
+            assert_eq!(draft.normals.len(), draft.positions.len());
+            assert!(draft.normals.iter().all(|n| n.norm() > 0.0));
+        }
+        let elsewhere = Constraints {
+            anchors: vec![anchor_at(Some(77))],
+            ..Constraints::default()
+        };
+        assert!(session.call(never).draft(&elsewhere).is_err());
     }
 
     #[test]
