@@ -1,7 +1,9 @@
 //! `darn healthcheck`: asks a running service whether it is ready, for containers that have no curl.
 
 use super::failure::{Failure, OrFail};
+use darn_serve::Listening;
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::time::Duration;
 
 #[derive(Debug, clap::Args)]
@@ -14,6 +16,9 @@ pub struct HealthcheckArgs {
         default_value = "127.0.0.1:8080"
     )]
     listen: SocketAddr,
+    /// File of the certificate that the service has, when it speaks TLS
+    #[arg(long, env = "DARN_TLS_CERT", value_name = "FILE")]
+    tls_cert: Option<PathBuf>,
     /// Seconds to wait for an answer
     #[arg(long, value_name = "SECONDS", default_value_t = 2, value_parser = clap::value_parser!(u64).range(1..=60))]
     patience: u64,
@@ -21,7 +26,11 @@ pub struct HealthcheckArgs {
 
 /// Runs `darn healthcheck`.
 pub fn run(args: &HealthcheckArgs) -> Result<(), Failure> {
-    darn_serve::healthcheck(args.listen, Duration::from_secs(args.patience))
+    let listening = Listening {
+        address: args.listen,
+        certificate: args.tls_cert.clone(),
+    };
+    darn_serve::healthcheck(&listening, Duration::from_secs(args.patience))
         .or_fail("see the service ready")?;
     println!("{}: ready", args.listen);
     Ok(())
@@ -45,6 +54,7 @@ mod tests {
         });
         let outcome = run(&HealthcheckArgs {
             listen,
+            tls_cert: None,
             patience: 2,
         });
         server.join().expect("the server ended");
@@ -71,6 +81,7 @@ mod tests {
         assert_eq!(
             run(&HealthcheckArgs {
                 listen,
+                tls_cert: None,
                 patience: 1
             })
             .expect_err("nobody listens")

@@ -5,7 +5,7 @@ use super::network;
 use crate::allocator;
 use crate::settings::ServeCommand;
 use darn_mend::{NetworkMender, SharedMender};
-use darn_serve::{LogDelivery, LogError, ServeError, start_logging};
+use darn_serve::{LogDelivery, LogError, ServeError, start_logging, start_traces};
 use std::sync::Arc;
 
 /// Runs `darn serve`.
@@ -21,6 +21,8 @@ pub fn run(settings: &ServeCommand) -> Result<(), Failure> {
                 },
             }
         })?;
+    // Sends its last spans before the log ends.
+    let _traces = start_traces().or_fail("send traces (OTEL_EXPORTER_OTLP_…)")?;
     // Here and not at the first mend, where an error would be a panic. 0: as many as processors.
     (rayon::ThreadPoolBuilder::new()
         .num_threads(settings.threads.unwrap_or(0))
@@ -36,9 +38,12 @@ pub fn run(settings: &ServeCommand) -> Result<(), Failure> {
     allocator::give_back_when_idle(move |unused| idle.release_idle(unused));
     match darn_serve::run(serve, Arc::new(SharedMender(mender))) {
         // Settings that are wrong, as those that clap refuses.
-        Err(error @ (ServeError::Exposed { .. } | ServeError::Keys(_))) => {
-            Err(Failure::Usage(error.to_string()))
-        }
+        Err(
+            error @ (ServeError::Exposed { .. }
+            | ServeError::Keys(_)
+            | ServeError::Tls(_)
+            | ServeError::AloneWithoutWorkers),
+        ) => Err(Failure::Usage(error.to_string())),
         outcome => outcome.or_fail("serve"),
     }
 }

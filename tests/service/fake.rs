@@ -375,6 +375,11 @@ impl EditSession for FakeSession {
         })
     }
 
+    /// The positions of the anchors, without the normals.
+    fn draft(&self, constraints: &Constraints, budget: &Budget<'_>) -> Result<Vec<u8>, Refusal> {
+        (self.patches(constraints, PatchForm::Positions, budget)).map(|patches| patches.bytes)
+    }
+
     fn mended(&self, constraints: &Constraints, _: &Budget<'_>) -> Result<Mended, Refusal> {
         let xs: Vec<f64> = constraints.anchors.iter().map(|a| a.position[0]).collect();
         Ok(Mended {
@@ -397,6 +402,8 @@ impl Mender for FakeMender {
         budget: &Budget<'_>,
     ) -> Result<Mended, Refusal> {
         let scan_read = self.act_on_scan(&scan)?;
+        let stage = budget.begin("flattening", 3);
+        stage.one_done();
         if scan_read.behaviour == Behaviour::UntilCancelled {
             while budget.check().is_ok() {
                 std::thread::sleep(Duration::from_millis(2));

@@ -25,6 +25,14 @@ pub struct Settings {
     pub serve: ServeArgs,
 }
 
+/// A client of HTTP. Its TLS wants a provider of cryptography also where a test does not speak it.
+pub fn client() -> reqwest::Client {
+    rustls::crypto::ring::default_provider()
+        .install_default()
+        .ok();
+    reqwest::Client::new()
+}
+
 /// A service under test.
 pub struct Service {
     pub address: SocketAddr,
@@ -34,11 +42,21 @@ pub struct Service {
     pub stop: CancellationToken,
     pub ended: JoinHandle<Result<(), ServeError>>,
     client: reqwest::Client,
+    scheme: &'static str,
 }
 
 impl Service {
     /// Starts with settings as on the command line, and waits until it is ready.
     pub async fn start(settings: &[&str]) -> Self {
+        Self::start_for(client(), "http", settings).await
+    }
+
+    /// Starts with settings, for a client that speaks this scheme, and waits until it is ready.
+    pub async fn start_for(
+        client: reqwest::Client,
+        scheme: &'static str,
+        settings: &[&str],
+    ) -> Self {
         let settings = [&["darn", "--listen", "127.0.0.1:0"], settings].concat();
         let settings = Settings::parse_from(settings).serve;
         let fake = Arc::new(FakeMender::default());
@@ -60,7 +78,8 @@ impl Service {
             app,
             stop,
             ended,
-            client: reqwest::Client::new(),
+            client,
+            scheme,
         };
         while service.get("/readyz").send().await.unwrap().status() != StatusCode::OK {
             tokio::time::sleep(Duration::from_millis(5)).await;
@@ -69,7 +88,7 @@ impl Service {
     }
 
     pub fn url(&self, path: &str) -> String {
-        format!("http://{}{path}", self.address)
+        format!("{}://{}{path}", self.scheme, self.address)
     }
 
     pub fn get(&self, path: &str) -> RequestBuilder {

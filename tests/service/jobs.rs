@@ -287,7 +287,12 @@ async fn a_running_job_is_cancelled_and_a_deleted_one_is_gone() {
     let running = accepted(hand_over(&service, Behaviour::UntilCancelled)).await;
     let told = until_state(&service, &running, "RUNNING").await;
     assert_eq!(told["attempt"], 1);
-    until(|| async { job(&service, &running).await["stage"] == "mending" }).await;
+    until(|| async { job(&service, &running).await["stage"] == "flattening" }).await;
+    let progress = job(&service, &running).await;
+    assert_eq!(
+        (&progress["holes"], &progress["holesDone"]),
+        (&json!(3), &json!(1))
+    );
     let waiting = accepted(hand_over(&service, "cloth")).await;
     assert_eq!(job(&service, &waiting).await["stage"], "waiting");
     let early = service

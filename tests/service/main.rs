@@ -1,12 +1,14 @@
 //! The service with its real router on a real socket, around a fake mender that behaves as each test says.
 
 mod anchors;
+mod cached;
 mod digests;
 mod editor;
 mod every_request;
 mod fake;
 mod faults;
 mod harness;
+mod instances;
 mod jobs;
 mod key_logs;
 mod keyed;
@@ -15,9 +17,12 @@ mod load;
 mod logs;
 mod openapi;
 mod peers;
+#[path = "../../crates/jobs/tests/laws/postgres.rs"]
+mod postgres;
 mod protocols;
 mod quotas;
 mod sessions;
 mod signals;
 mod strip;
+mod tls;
 mod uploads;

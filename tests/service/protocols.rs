@@ -3,7 +3,7 @@
 use darn_contract::v1::{
     Anchor, Constraints, HolesQuery, ScanChunk, inpaint_chunk::Part as ChunkPart,
 };
-use darn_serve::generated::darn_client::DarnClient;
+use darn_serve::{Listening, generated::darn_client::DarnClient};
 use reqwest::multipart::{Form, Part};
 use serde_json::Value;
 use tonic::{Code, codegen::tokio_stream};
@@ -267,7 +267,9 @@ async fn a_health_check_tells_whether_the_service_is_ready() {
     let service = Service::start(&[]).await;
     let ask = |address| {
         let timeout = std::time::Duration::from_secs(5);
-        tokio::task::spawn_blocking(move || darn_serve::healthcheck(address, timeout))
+        tokio::task::spawn_blocking(move || {
+            darn_serve::healthcheck(&Listening::plain(address), timeout)
+        })
     };
     ask(service.address).await.unwrap().unwrap();
     service.stop.cancel();

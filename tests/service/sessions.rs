@@ -85,6 +85,18 @@ async fn a_session_is_opened_edited_and_ended() {
     assert_eq!(code(refused).await, (422, "not_a_disk".to_owned()));
     let edited = service.get(&result).send().await.unwrap();
     assert_eq!(edited.text().await.unwrap(), "glTF cloth [0.75]");
+    // Nor do drafts count.
+    let draft = service.ask(&format!("{edit}?draft=true"), edit_at(2.0));
+    let draft = draft.send().await.unwrap();
+    let media_type = &draft.headers()["content-type"];
+    assert_eq!(media_type, "application/octet-stream");
+    assert!(draft.headers().get("darn-result").is_none());
+    assert_eq!(draft.bytes().await.unwrap()[..4], 2.0_f32.to_le_bytes());
+    let edited = service.get(&result).send().await.unwrap();
+    assert_eq!(edited.text().await.unwrap(), "glTF cloth [0.75]");
+    let unknown = service.ask(&format!("{edit}?draft=perhaps"), edit_at(2.0));
+    let unknown = unknown.send().await.unwrap();
+    assert_eq!(code(unknown).await, (400, "malformed_request".to_owned()));
     // No body means no constraints.
     let none = service.post(&edit).send().await.unwrap();
     assert_eq!(none.status(), 200);

@@ -9,7 +9,7 @@ use std::{
 };
 
 use clap::Parser;
-use darn_serve::{LogDelivery, LogFormat, healthcheck, run, start_logging};
+use darn_serve::{Listening, LogDelivery, LogFormat, healthcheck, run, start_logging};
 
 use crate::fake::{FakeMender, FakeScan};
 use crate::harness::Settings;
@@ -69,7 +69,7 @@ pub fn start(stderr: Stdio) -> (Process, SocketAddr) {
 pub fn start_behind(mut program: Command, address: SocketAddr) -> Process {
     let child = Process(program.spawn().unwrap());
     let end = Instant::now() + TIMEOUT;
-    while healthcheck(address, TIMEOUT).is_err() {
+    while healthcheck(&Listening::plain(address), TIMEOUT).is_err() {
         assert!(Instant::now() < end, "the service never was ready");
         std::thread::sleep(Duration::from_millis(10));
     }

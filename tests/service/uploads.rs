@@ -13,7 +13,7 @@ use tokio::{
     time::timeout,
 };
 
-use crate::harness::{Service, Settings, connect_from, problem};
+use crate::harness::{Service, Settings, client, connect_from, problem};
 
 const TIMEOUT: Duration = Duration::from_secs(10);
 
@@ -157,7 +157,7 @@ async fn compressed_bodies_are_read_within_the_body_limit() {
 async fn a_body_without_a_media_type_is_told_by_its_first_bytes() {
     let service = Service::start(&[]).await;
     let url = format!("http://{}/inpaint", service.address);
-    let client = reqwest::Client::new();
+    let client = client();
     let post = |media: Option<&'static str>, body: &'static [u8]| {
         let request = client.post(&url).body(body);
         let request = match media {
@@ -182,7 +182,7 @@ async fn files_of_a_scan_come_as_parts_named_by_their_uris() {
     let service = Service::start(&[]).await;
     let url = format!("http://{}/inpaint", service.address);
     let send = |form: Form| {
-        let request = reqwest::Client::new().post(&url).multipart(form);
+        let request = client().post(&url).multipart(form);
         async move { request.send().await.unwrap() }
     };
     let scan = || Part::bytes(b"{}".to_vec());

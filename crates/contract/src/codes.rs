@@ -116,6 +116,10 @@ codes! {
     SESSION_EVICTED = "session_evicted", 410, NotFound;
     /// The session was deleted.
     SESSION_DELETED = "session_deleted", 410, NotFound;
+    /// The process that kept the session has ended.
+    SESSION_LOST = "session_lost", 410, NotFound;
+    /// Another instance of the service keeps the session.
+    SESSION_ELSEWHERE = "session_elsewhere", 421, FailedPrecondition;
     /// The session alone is larger than all sessions may be.
     SESSION_TOO_LARGE = "session_too_large", 413, ResourceExhausted;
     /// Too many requests for one session at once.
@@ -154,6 +158,8 @@ codes! {
     UPLOADS_FULL = "uploads_full", 503, Unavailable;
     /// The service shuts down.
     DRAINING = "draining", 503, Unavailable;
+    /// The process has no workers; it takes jobs alone.
+    NO_WORKERS = "no_workers", 421, FailedPrecondition;
     /// The service has not finished its warm-up mend.
     WARMING_UP = "warming_up", 503, Unavailable;
     /// Waiting and mending took longer than the deadline.

@@ -35,6 +35,16 @@ impl Jobs {
         }
     }
 
+    /// Says, for ever, that an instance lives. Stopped, the instance counts as dead after the time of a lease.
+    pub async fn live_as(&self, instance: &str) {
+        loop {
+            if let Err(error) = self.store().instance_lives(instance).await {
+                warn!(?error, "the database was not told that this instance lives");
+            }
+            sleep(self.settings().renewal).await;
+        }
+    }
+
     /// Does a chore, unless this or another process has done it in its present period.
     async fn do_chore(&self, chore: Chore) -> Result<usize, JobError> {
         let period = match chore {

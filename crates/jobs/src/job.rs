@@ -93,6 +93,8 @@ pub struct Job {
     pub priority: i64,
     /// Where the client wants to be told of its end; opaque here.
     pub webhook: Option<String>,
+    /// Where its submission stands in a trace; opaque here.
+    pub trace: Option<String>,
     /// What was asked, as JSON; opaque here.
     pub request: String,
     /// Where it is in its life.
@@ -191,6 +193,8 @@ pub struct Submission {
     pub priority: i64,
     /// Where the client wants to be told of the job's end; opaque here.
     pub webhook: Option<String>,
+    /// Where the submission stands in a trace; opaque here, and no part of the payload.
+    pub trace: Option<String>,
     /// What is asked, as JSON; opaque here.
     pub request: String,
 }

@@ -445,6 +445,7 @@ fn digest(submission: &Submission, input: &[u8; 32]) -> String {
         name,
         priority,
         webhook,
+        trace: _,
         request,
     } = submission;
     let mut sha256 = Sha256::new();

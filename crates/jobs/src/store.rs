@@ -5,6 +5,7 @@
 //! row that names it, and deletes it after the row that names it no more.
 
 mod attempts;
+mod instances;
 mod requests;
 mod retention;
 
@@ -121,13 +122,14 @@ impl Store {
             name,
             priority,
             webhook,
+            trace,
             request,
         } = submission;
         let now = self.engine.dialect().now;
         let insert = format!(
-            "INSERT INTO jobs (id, client, idempotency_key, digest, name, priority, webhook, request, input, bytes,
+            "INSERT INTO jobs (id, client, idempotency_key, digest, name, priority, webhook, request, input, bytes, trace,
                 state, version, attempt, created_at, changed_at)
-             VALUES ($2, $3, $4, $5, $6, $7, $8, $9, $10, $11, 'waiting', 1, 0, {now}, {now})
+             VALUES ($2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, 'waiting', 1, 0, {now}, {now})
              ON CONFLICT (client, idempotency_key) WHERE idempotency_key IS NOT NULL DO NOTHING
              RETURNING *"
         );
@@ -144,6 +146,7 @@ impl Store {
                 request.as_str(),
                 input.as_str(),
                 *bytes,
+                trace.clone(),
             ];
             if let Some(row) = first(self.engine.write(Urgency::Ordinary, &insert, args).await?) {
                 return Ok(Submitted::New(job(&row)?));
@@ -298,6 +301,7 @@ fn job(row: &Row) -> Result<Job, JobError> {
         name: row.text("name")?,
         priority: row.some("priority", Row::int)?,
         webhook: row.text("webhook")?,
+        trace: row.text("trace")?,
         request: row.some("request", Row::text)?,
         state: state(row)?,
         version: row.some("version", Row::int)?,

@@ -21,16 +21,19 @@ use super::{
     config::ServeArgs,
     connection_table::{ConnectionLimits, ConnectionTable},
     error::RequestError,
+    instance::{Instance, InstanceName, SessionPlace},
     kept_session::KeptSession,
     keys::KeyRing,
     pace::PaceLimits,
     pool::{JobTurn, Pool},
     pool_task::{PoolError, TaskOrder},
-    session_store::{SessionLimits, SessionStore},
+    result_cache::ResultCache,
+    session_store::{SessionError, SessionLimits, SessionStore},
     telemetry::Metrics,
+    tls::ServedCertificate,
     uploads::{BodySize, UploadRefusal, UploadSlot, Uploads},
 };
-use darn_budget::{Budget, Limits, MemoryPool};
+use darn_budget::{Budget, Limits, Listener, MemoryPool};
 use darn_contract::codes;
 use darn_contract::port::{Mender, Refusal};
 
@@ -61,8 +64,16 @@ pub struct App {
     pub sessions: Arc<SessionStore>,
     /// The durable jobs; `None` without a data folder.
     pub jobs: Option<Arc<Jobs>>,
+    /// Mends of requests that may come again; `None` where none are kept.
+    pub results: Option<ResultCache>,
     /// The keys; `None` where anybody may call.
     pub keys: Option<Arc<KeyRing>>,
+    /// The certificate of TLS; `None` for plain connections.
+    pub certificate: Option<Arc<ServedCertificate>>,
+    /// This process among those that serve together.
+    pub instance: Instance,
+    /// Whether another process may keep sessions that come here.
+    company: Company,
     /// Cancelled when the service begins to shut down.
     pub stopping: CancellationToken,
     pool: Pool,
@@ -71,8 +82,20 @@ pub struct App {
     /// The bodies being received.
     uploads: Uploads,
     mender: Arc<dyn Mender>,
+    has_workers: bool,
     warm: AtomicBool,
     draining: AtomicBool,
+}
+
+/// What a process knows of others that serve together with it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Company {
+    /// There are none: it has no database, and no name among others.
+    None,
+    /// It has a name among others, but no database that says which of them live.
+    Unknown,
+    /// The database says which live.
+    Known,
 }
 
 /// Allows one request to receive its body and to queue its job; given back when dropped.
@@ -101,6 +124,15 @@ struct TaskSize {
     client: Client,
     /// Bytes of its scan.
     bytes: usize,
+}
+
+/// The size of a durable job, and who is told how far it is.
+#[derive(Debug)]
+pub struct DurableSize {
+    /// Bytes of its scan.
+    pub bytes: usize,
+    /// Who is told.
+    pub listener: Listener,
 }
 
 /// When a request's result comes too late.
@@ -163,19 +195,20 @@ impl App {
         settings: &ServeArgs,
         mender: Arc<dyn Mender>,
     ) -> Result<Arc<Self>, ServeError> {
-        let jobs = match &settings.data {
-            Some(folder) => {
-                let place = Place::Folder(folder.clone());
+        let jobs = match settings.place() {
+            Some(place) => {
                 let opened = Jobs::open(&place, darn_jobs::Settings::default()).await;
-                Some(opened.map_err(|source| ServeError::Jobs {
-                    folder: folder.clone(),
-                    source,
-                })?)
+                let (Place::Folder(folder) | Place::Shared { folder, .. }) = place;
+                Some(opened.map_err(|source| ServeError::Jobs { folder, source })?)
             }
             None => None,
         };
         let keys = match &settings.keys {
             Some(path) => Some(KeyRing::open(path).await?),
+            None => None,
+        };
+        let certificate = match settings.tls_files() {
+            Some(files) => Some(ServedCertificate::open(files, settings.tls_handshake).await?),
             None => None,
         };
         let metrics = Metrics::new().map_err(std::io::Error::other)?;
@@ -210,12 +243,21 @@ impl App {
             editor: !settings.no_editor,
             sessions,
             jobs,
+            results: settings.result_cache.map(ResultCache::new),
             keys,
+            certificate,
+            instance: Instance::new(settings.instance.unwrap_or_else(InstanceName::random)),
+            company: match (&settings.database, settings.instance) {
+                (Some(_), _) => Company::Known,
+                (None, Some(_)) => Company::Unknown,
+                (None, None) => Company::None,
+            },
             stopping: CancellationToken::new(),
             pool,
             sharing,
             uploads: Uploads::new(settings.uploads()),
             mender,
+            has_workers: settings.workers() > 0,
             warm: AtomicBool::new(false),
             draining: AtomicBool::new(false),
         }))
@@ -292,12 +334,41 @@ impl App {
         Ok(UploadPermit { client, slot })
     }
 
+    /// Whether anything is mended in this process.
+    pub fn has_workers(&self) -> bool {
+        self.has_workers
+    }
+
+    /// Checks that this process would keep the session of an id, if there is one.
+    ///
+    /// # Errors
+    /// `Unknown` for an id that no instance makes; `Elsewhere` where another instance keeps it; `Lost` where none does any more.
+    pub async fn check_session_place(&self, session: Uuid) -> Result<(), RequestError> {
+        let name = match self.instance.place_of(session) {
+            SessionPlace::Here => return Ok(()),
+            SessionPlace::Nowhere => return Err(SessionError::Unknown.into()),
+            SessionPlace::BeforeRestart => return Err(SessionError::Lost.into()),
+            SessionPlace::At(name) => name,
+        };
+        let is_alive = match (self.company, &self.jobs) {
+            (Company::Known, Some(jobs)) => {
+                jobs.store().is_instance_alive(&name.to_string()).await?
+            }
+            (Company::Unknown, _) => true,
+            _ => false,
+        };
+        Err(match is_alive {
+            true => SessionError::Elsewhere(name).into(),
+            false => SessionError::Lost.into(),
+        })
+    }
+
     /// Waits until a durable job may take a worker.
     pub async fn job_turn(&self) -> JobTurn {
         self.pool.job_turn().await
     }
 
-    /// Runs the work of a durable job on a scan of this many bytes, with the work and memory that a request with that scan may cost, but
+    /// Runs the work of a durable job on a scan of this size, with the work and memory that a request with that scan may cost, but
     /// with a deadline of its own. Dropping the future cancels the work.
     ///
     /// # Errors
@@ -305,12 +376,13 @@ impl App {
     pub async fn run_durable<T: Send + 'static>(
         &self,
         turn: JobTurn,
-        bytes: usize,
+        size: DurableSize,
         work: impl FnOnce(&dyn Mender, &Budget<'_>) -> Result<T, Refusal> + Send + 'static,
     ) -> Result<T, RequestError> {
         let deadline = Deadline::after(DURABLE_DEADLINE);
         let mender = Arc::clone(&self.mender);
-        let order = self.task_order(bytes, deadline);
+        let mut order = self.task_order(size.bytes, deadline);
+        order.limits.listener = Some(size.listener);
         let outcome = (self.pool)
             .run_job(turn, order, move |budget| work(&*mender, budget))
             .await;
@@ -409,7 +481,7 @@ impl App {
     /// `WarmingUp` or `Draining`.
     pub fn ready(&self) -> Result<(), RequestError> {
         self.check_serving()?;
-        if self.warm.load(Relaxed) {
+        if self.warm.load(Relaxed) || !self.has_workers() {
             Ok(())
         } else {
             Err(RequestError::WarmingUp)

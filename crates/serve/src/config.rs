@@ -4,7 +4,9 @@ use std::{net::SocketAddr, ops::RangeInclusive, path::PathBuf, time::Duration};
 
 use clap::Args;
 
-use super::telemetry::LogFormat;
+use darn_jobs::Place;
+
+use super::{instance::InstanceName, telemetry::LogFormat, tls::TlsFiles};
 
 /// Upper bound of the settings `queue` and `uploads`.
 const MAX_WAITING: usize = 65_536;
@@ -42,11 +44,40 @@ pub struct ServeArgs {
     #[arg(long, env = "DARN_ALLOW_ANONYMOUS", conflicts_with = "keys")]
     pub allow_anonymous: bool,
 
+    /// File of the certificate chain, in PEM, with which HTTP and gRPC are served over TLS (1.2 and 1.3); read again when it changes.
+    /// Left out, connections are plain
+    #[arg(long, env = "DARN_TLS_CERT", value_name = "FILE", requires = "tls_key")]
+    pub tls_cert: Option<PathBuf>,
+
+    /// File of the certificate's private key, in PEM, not encrypted; read again when it changes
+    #[arg(long, env = "DARN_TLS_KEY", value_name = "FILE", requires = "tls_cert")]
+    pub tls_key: Option<PathBuf>,
+
+    /// Longest time of a TLS handshake, such as 10s
+    #[arg(long, env = "DARN_TLS_HANDSHAKE", value_name = "TIME", default_value = "10s", value_parser = duration)]
+    pub tls_handshake: Duration,
+
     /// Folder in which jobs are kept, which survive the process; left out, the service takes no jobs
     #[arg(long, env = "DARN_DATA", value_name = "DIR")]
     pub data: Option<PathBuf>,
 
-    /// Scans mended at once, at most 1024; left out, two per processor
+    /// PostgreSQL (15 or newer) that several processes share for their jobs, as `postgres://user:password@host/database`; the data folder
+    /// then is one that they all see, and has the files. Left out, the folder is this process's alone
+    #[arg(
+        long,
+        env = "DARN_DATABASE",
+        value_name = "URL",
+        requires = "data",
+        hide_env_values = true
+    )]
+    pub database: Option<String>,
+
+    /// Name of this process among those that serve together, 1 to 12 hexadecimal digits: the ids of its sessions begin with it. Left out,
+    /// a random one
+    #[arg(long, env = "DARN_INSTANCE", value_name = "NAME")]
+    pub instance: Option<InstanceName>,
+
+    /// Scans mended at once, at most 1024; left out, two per processor. With 0 the process takes jobs for others to run, and needs a database
     #[arg(long, env = "DARN_WORKERS", value_name = "N", value_parser = workers)]
     pub workers: Option<usize>,
 
@@ -74,6 +105,10 @@ pub struct ServeArgs {
     /// and queue together. Bodies take at most this plus workers plus queue times the body limit of memory
     #[arg(long, env = "DARN_UPLOADS", value_name = "N", value_parser = uploads)]
     pub uploads: Option<usize>,
+
+    /// Memory for answers of /inpaint that may be asked for again, such as 1GiB; left out, none is kept
+    #[arg(long, env = "DARN_RESULT_CACHE", value_name = "SIZE", value_parser = size)]
+    pub result_cache: Option<usize>,
 
     /// Longest time a scan may wait and be mended, such as 30s or 500ms
     #[arg(long, env = "DARN_DEADLINE", value_name = "TIME", default_value = "60s", value_parser = duration)]
@@ -152,6 +187,23 @@ impl ServeArgs {
         addresses.find(|address| !address.ip().to_canonical().is_loopback())
     }
 
+    /// Where the jobs are kept; `None` where none are.
+    pub(crate) fn place(&self) -> Option<Place> {
+        let folder = self.data.clone()?;
+        Some(match self.database.clone() {
+            Some(url) => Place::Shared { url, folder },
+            None => Place::Folder(folder),
+        })
+    }
+
+    /// The files of the certificate; `None` for plain connections.
+    pub(crate) fn tls_files(&self) -> Option<TlsFiles> {
+        Some(TlsFiles {
+            certificate: self.tls_cert.clone()?,
+            key: self.tls_key.clone()?,
+        })
+    }
+
     /// Worker threads. Without a setting two per processor, since a worker waits while the shared threads do its parallel work.
     pub fn workers(&self) -> usize {
         self.workers.unwrap_or_else(|| {
@@ -206,7 +258,7 @@ fn machine_memory() -> usize {
 }
 
 fn workers(text: &str) -> Result<usize, String> {
-    within(text, 1..=1024)
+    within(text, 0..=1024)
 }
 
 fn queue(text: &str) -> Result<usize, String> {
@@ -361,15 +413,16 @@ mod tests {
         assert_eq!(settings.body_rate, 512);
         let unlimited = Command::try_parse_from(["darn", "--body-rate", "0"]);
         assert_eq!(unlimited.unwrap().serve.body_rate, 0);
-        let error = Command::try_parse_from(["darn", "--workers", "0"])
+        let error = Command::try_parse_from(["darn", "--workers", "1025"])
             .unwrap_err()
             .to_string();
         assert!(
-            error.contains("--workers") && error.contains("from 1 to 1024"),
+            error.contains("--workers") && error.contains("from 0 to 1024"),
             "{error}"
         );
         for bad in [
-            ["--workers", "1025"],
+            ["--instance", "worker-1"],
+            ["--database", "postgres://database"],
             ["--queue", "99999999999999999999"],
             ["--queue", "65537"],
             ["--uploads", "0"],
@@ -402,6 +455,8 @@ mod tests {
         for (listen, grpc) in [("0.0.0.0:80", "127.0.0.1:81"), ("127.0.0.1:81", "[::]:80")] {
             assert!(exposed(&["--listen", listen, "--grpc-listen", grpc]).is_some());
         }
+        let half = ["darn", "--tls-cert", "chain.pem"];
+        assert!(Command::try_parse_from(half).is_err());
         let both = ["darn", "--keys", "keys.json", "--allow-anonymous"];
         assert!(Command::try_parse_from(both).is_err());
     }

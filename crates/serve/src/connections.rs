@@ -1,4 +1,4 @@
-//! One listening socket: accepts connections, has hyper serve them, and closes those whose peer is silent or does not read, and those
+//! One listening socket: accepts connections, has hyper serve them, over TLS where there is a certificate, and closes those whose peer is silent or does not read, and those
 //! that are too many.
 //!
 //! axum's own `serve` gives hyper no timer: a peer that sends half a request, never reads its answer or has vanished would keep its
@@ -17,7 +17,10 @@ use axum::{Router, http::Request};
 use hyper::{body::Incoming, service::service_fn};
 use hyper_util::{
     rt::{TokioIo, TokioTimer},
-    server::{conn::auto, graceful::GracefulShutdown},
+    server::{
+        conn::auto,
+        graceful::{GracefulShutdown, Watcher},
+    },
 };
 use tokio::{
     io::{AsyncRead, AsyncWrite, ReadBuf},
@@ -31,9 +34,10 @@ use tracing::{debug, error};
 use super::{
     answer::{self, AnswerBody, StreamExecutor, while_read},
     client_address::ClientAddress,
-    connection_table::{Activity, ConnectionTable, RequestTurn},
+    connection_table::{Activity, Admission, ConnectionTable, RequestTurn},
     pace::PaceLimits,
     request_body::RequestBody,
+    tls::ServedCertificate,
 };
 
 /// Bytes after which hyper knows the HTTP version and its own timers apply.
@@ -48,26 +52,83 @@ const MAX_HEADER_BYTES: u32 = 16 << 10;
 /// Bytes that an HTTP/2 connection, and each of its streams, may send ahead.
 const RECEIVE_WINDOW: u32 = 1 << 20;
 
+/// What a listening socket serves.
+#[derive(Clone)]
+pub struct Listener {
+    /// What answers requests.
+    pub router: Router,
+    /// The open connections.
+    pub table: Arc<ConnectionTable>,
+    /// The certificate of TLS; `None` for plain connections.
+    pub certificate: Option<Arc<ServedCertificate>>,
+}
+
 /// Accepts and serves until `stop` is cancelled, then until the last request under way is answered.
 ///
 /// A peer may take one pause to send the head of a request, to take a piece of an answer, and (HTTP/2) to answer a ping.
-pub async fn serve(
-    socket: TcpListener,
-    router: Router,
-    table: Arc<ConnectionTable>,
-    stop: CancellationToken,
-) {
-    let pace = table.limits.pace;
-    let http = http_settings(pace);
+pub async fn serve(socket: TcpListener, listener: Listener, stop: CancellationToken) {
     let connections = GracefulShutdown::new();
     while let Some((stream, client)) = stop.run_until_cancelled(accept(&socket)).await {
-        let Some(admission) = table.admit(client) else {
+        let Some(admission) = listener.table.admit(client) else {
             debug!(address = %client.0, "too many connections; a new one is closed");
             continue;
         };
-        let activity = Arc::clone(&admission.activity);
+        let connection = Connection {
+            client,
+            activity: Arc::clone(&admission.activity),
+            watcher: connections.watcher(),
+            router: listener.router.clone(),
+            pace: listener.table.limits.pace,
+        };
+        let certificate = listener.certificate.clone();
+        let stop = stop.clone();
+        tokio::spawn(run_admitted(admission, async move {
+            let Some(certificate) = certificate else {
+                return connection.serve(stream).await;
+            };
+            // Nothing is under way yet, so a shutdown does not wait for a handshake.
+            match stop.run_until_cancelled(certificate.accept(stream)).await {
+                Some(Ok(stream)) => connection.serve(stream).await,
+                Some(Err(error)) => debug!(%error, "a handshake failed"),
+                None => {}
+            }
+        }));
+    }
+    drop(socket);
+    connections.shutdown().await;
+}
+
+/// Runs a connection until it ends, or until it has to give way to a new one. The admission is given back then.
+async fn run_admitted(admission: Admission, connection: impl Future<Output = ()>) {
+    let close = admission.close.clone();
+    if close.run_until_cancelled(connection).await.is_none() {
+        debug!("a silent connection gives way to a new one");
+    }
+}
+
+/// A connection that was admitted.
+struct Connection {
+    client: ClientAddress,
+    activity: Arc<Activity>,
+    watcher: Watcher,
+    router: Router,
+    pace: PaceLimits,
+}
+
+impl Connection {
+    /// Serves the requests that come over a stream, until the connection ends.
+    async fn serve<S>(self, stream: S)
+    where
+        S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
+    {
+        let Self {
+            client,
+            activity,
+            watcher,
+            router,
+            pace,
+        } = self;
         let io = TimeoutStream::new(stream, pace.pause, Arc::clone(&activity));
-        let router = router.clone();
         let service = service_fn(move |request: Request<Incoming>| {
             let turn = RequestTurn::new(&activity);
             let guard = turn.guard();
@@ -80,22 +141,14 @@ pub async fn serve(
                 answer.map(|answer| AnswerBody::new(answer, pace))
             }
         });
+        let http = http_settings(pace);
         let connection = http.serve_connection(TokioIo::new(io), service);
-        let connection = connections.watch(connection.into_owned());
-        tokio::spawn(async move {
-            // Given back when the task ends.
-            let admission = admission;
-            let served = while_read(pace, connection);
-            match admission.close.run_until_cancelled(served).await {
-                Some(Some(Ok(()))) => {}
-                Some(Some(Err(error))) => debug!(error, "a connection broke"),
-                Some(None) => debug!("an answer was not taken; its connection is closed"),
-                None => debug!("a silent connection gives way to a new one"),
-            }
-        });
+        match while_read(pace, watcher.watch(connection.into_owned())).await {
+            Some(Ok(())) => {}
+            Some(Err(error)) => debug!(error, "a connection broke"),
+            None => debug!("an answer was not taken; its connection is closed"),
+        }
     }
-    drop(socket);
-    connections.shutdown().await;
 }
 
 fn http_settings(pace: PaceLimits) -> auto::Builder<StreamExecutor> {

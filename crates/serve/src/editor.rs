@@ -13,7 +13,7 @@ use axum::{
 };
 use bytes::Bytes;
 
-use super::app::App;
+use super::{app::App, entity_tag};
 
 /// What the page may load: its own files and this service's answers, textures that it unpacks from a scan (`blob:`, `data:`), WebAssembly
 /// of decoders, and scans from the address that a person names in the page's own address (`#scan=URL`). No inline script or style.
@@ -55,7 +55,7 @@ fn answer(file: &'static EditorFile, request: &HeaderMap) -> Response {
     let compressed = takes_gzip(request);
     let suffix = if compressed { "-gzip" } else { "" };
     let tag = format!("\"{}{suffix}\"", file.hash);
-    let known = has(request, &tag);
+    let known = entity_tag::is_known(request, &tag);
     let headers = [
         (header::ETAG, tag),
         // Asked for again at every load; the answer is then 304 unless darn is another version.
@@ -98,16 +98,6 @@ fn takes_gzip(request: &HeaderMap) -> bool {
     (codings.iter())
         .find(|(name, _)| name == "gzip" || name == "*")
         .is_some_and(|(_, taken)| *taken)
-}
-
-/// Whether `if-none-match` names the tag. Tags are compared weakly (RFC 9110, section 13.1.2).
-fn has(request: &HeaderMap, tag: &str) -> bool {
-    let values = request.get_all(header::IF_NONE_MATCH).iter();
-    let mut tags = values
-        .filter_map(|value| value.to_str().ok())
-        .flat_map(|text| text.split(','))
-        .map(|text| text.trim().trim_start_matches("W/"));
-    tags.any(|known| known == tag || known == "*")
 }
 
 #[cfg(test)]

@@ -127,6 +127,11 @@ pub enum RequestError {
     /// The session does not exist or cannot be used.
     #[error(transparent)]
     Session(#[from] SessionError),
+    /// The process has no workers.
+    #[error(
+        "this process has no workers (DARN_WORKERS=0): it takes scans to mend, as jobs, and answers for jobs alone; send this request to a process that has workers"
+    )]
+    NoWorkers,
     /// There are no jobs here.
     #[error(
         "this service keeps no jobs: it was started without `--data DIR` (DARN_DATA); POST /inpaint mends at once"
@@ -287,6 +292,8 @@ impl RequestError {
                 SessionError::Ended(EndReason::Idle) => codes::SESSION_EXPIRED,
                 SessionError::Ended(EndReason::Evicted) => codes::SESSION_EVICTED,
                 SessionError::Ended(EndReason::Deleted) => codes::SESSION_DELETED,
+                SessionError::Lost => codes::SESSION_LOST,
+                SessionError::Elsewhere(_) => codes::SESSION_ELSEWHERE,
                 SessionError::Quota(_) => codes::QUOTA_EXCEEDED,
                 SessionError::Busy { .. } => codes::SESSION_BUSY,
                 SessionError::TooLarge { .. } => codes::SESSION_TOO_LARGE,
@@ -303,6 +310,7 @@ impl RequestError {
             Self::UploadsFull { .. } | Self::UploadShareFull { .. } => codes::UPLOADS_FULL,
             Self::MemoryFull { .. } => codes::MEMORY_FULL,
             Self::Draining => codes::DRAINING,
+            Self::NoWorkers => codes::NO_WORKERS,
             Self::WarmingUp => codes::WARMING_UP,
             Self::Deadline { .. } => codes::DEADLINE_EXCEEDED,
             Self::Internal => codes::INTERNAL,

@@ -7,7 +7,7 @@ use std::{
 
 use axum::{
     body::Body,
-    http::{HeaderMap, HeaderValue, header},
+    http::{HeaderMap, HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
 };
 use bytes::Bytes;
@@ -25,6 +25,7 @@ use super::{
     accept::preferred,
     app::App,
     counted::take,
+    entity_tag,
     error::RequestError,
     job_message::kept_answer,
     media_types::{JSON, MULTIPART_MIXED},
@@ -46,7 +47,12 @@ pub async fn result(
     let (job, file) = jobs.result(id).await?;
     let answer = kept_answer(&job).ok_or(RequestError::Internal)?;
     if preferred(headers, &[answer.media_type(), MULTIPART_MIXED]) != MULTIPART_MIXED {
-        return alone(file, answer.headers()).await;
+        let answer = answer.headers();
+        let tag = answer.get(header::ETAG).and_then(|tag| tag.to_str().ok());
+        if tag.is_some_and(|tag| entity_tag::is_known(headers, tag)) {
+            return Ok((StatusCode::NOT_MODIFIED, not_modified(answer)).into_response());
+        }
+        return alone(file, answer).await;
     }
     let (_, report) = jobs.report(id).await?;
     // Once as they are read, once in the answer.
@@ -75,6 +81,12 @@ pub async fn report(jobs: &Jobs, id: Uuid) -> Result<Response, RequestError> {
         (header::CACHE_CONTROL, HeaderValue::from_static("no-store")),
     ];
     alone(file, HeaderMap::from_iter(headers)).await
+}
+
+/// What is said of a file that is not sent, as the caller has it (RFC 9110, section 15.4.5).
+fn not_modified(mut headers: HeaderMap) -> HeaderMap {
+    headers.remove(header::CONTENT_TYPE);
+    headers
 }
 
 async fn alone(file: File, mut headers: HeaderMap) -> Result<Response, RequestError> {

@@ -1,11 +1,11 @@
 //! A job as clients see it.
 
 use axum::http::StatusCode;
-use darn_jobs::{CRASHED, Job, State};
+use darn_jobs::{CRASHED, Job, Progress, State};
 use serde_json::Value;
 
 use super::{
-    job_worker::{MENDING, READING, WAITING, WRITING},
+    job_worker::{READING, WAITING},
     response::KeptAnswer,
 };
 use darn_contract::{codes, v1};
@@ -38,6 +38,8 @@ pub fn message(job: &Job) -> v1::Job {
         report: job.report.as_ref().map(|_| path("report")),
         outcome: kept_answer(job).and_then(|answer| answer.result().map(str::to_owned)),
         problem: problem(job),
+        holes: holes(job, |progress| progress.holes),
+        holes_done: holes(job, |progress| progress.hole),
     }
 }
 
@@ -95,19 +97,24 @@ fn problem(job: &Job) -> Option<v1::JobProblem> {
 }
 
 /// What is done now.
-fn stage(job: &Job) -> &'static str {
-    let told = job
+fn stage(job: &Job) -> &str {
+    match (job.state, &job.progress) {
+        (State::Waiting, _) => WAITING,
+        (State::Running, None) => READING,
+        (State::Running, Some(progress)) => &progress.stage,
+        (State::Done | State::Error | State::Cancelled, _) => "",
+    }
+}
+
+/// A count of the holes of a stage; 0 where nothing is done hole by hole.
+fn holes(job: &Job, count: impl Fn(&Progress) -> i64) -> u32 {
+    let progress = job
         .progress
         .as_ref()
-        .map(|progress| progress.stage.as_str());
-    match job.state {
-        State::Waiting => WAITING,
-        State::Running => [READING, MENDING, WRITING]
-            .into_iter()
-            .find(|stage| told == Some(*stage))
-            .unwrap_or(READING),
-        State::Done | State::Error | State::Cancelled => "",
-    }
+        .filter(|_| job.state == State::Running);
+    progress.map_or(0, |progress| {
+        u32::try_from(count(progress)).unwrap_or_default()
+    })
 }
 
 /// A time in milliseconds since 1970.

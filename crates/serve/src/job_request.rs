@@ -8,7 +8,7 @@ use super::{
     client::{Client, ClientId},
     error::{ParameterKind, RequestError},
     parameters::Parameters,
-    response,
+    response, traces,
 };
 use darn_contract::{Constraints, FieldError, excerpt, from_json, port::ScanForm, v1};
 
@@ -159,6 +159,7 @@ impl JobLabels {
             name: self.name,
             priority: self.priority,
             webhook: None,
+            trace: traces::current_parent(),
             request: request.text(),
         }
     }

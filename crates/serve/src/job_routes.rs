@@ -113,6 +113,32 @@ pub async fn inpaint_later(
     request: Request,
     preferences: Preferences,
 ) -> Result<Response, RequestError> {
+    let wait = preferences.wait.unwrap_or_default();
+    let mut answer = inpaint_within(app, jobs, request, wait.min(app.limits.deadline)).await?;
+    let applied = preferences.applied();
+    answer.headers_mut().insert(PREFERENCE_APPLIED, applied);
+    Ok(answer)
+}
+
+/// `POST /inpaint` to a process without workers: another one mends the scan as a job, whose result is waited for until the deadline.
+///
+/// # Errors
+/// Those of receiving the request, and of the jobs.
+pub async fn inpaint_elsewhere(
+    app: &App,
+    jobs: &Jobs,
+    request: Request,
+) -> Result<Response, RequestError> {
+    inpaint_within(app, jobs, request, app.limits.deadline).await
+}
+
+/// Hands a scan over as a job; the answer is its result, or the job itself where that takes longer than `wait`.
+async fn inpaint_within(
+    app: &App,
+    jobs: &Jobs,
+    request: Request,
+    wait: Duration,
+) -> Result<Response, RequestError> {
     let headers = request.headers().clone();
     let id = request.extensions().get::<RequestId>().cloned();
     let labels = match JobLabels::of_headers(&headers) {
@@ -123,9 +149,8 @@ pub async fn inpaint_later(
         }
     };
     let job = hand_over(app, jobs, request, labels).await?;
-    let wait = preferences.wait.unwrap_or_default();
-    let job = finished_within(app, jobs, job, wait.min(app.limits.deadline)).await?;
-    let mut answer = match job.state {
+    let job = finished_within(app, jobs, job, wait).await?;
+    Ok(match job.state {
         JobState::Done => {
             let mut answer = job_answer::result(app, jobs, job.id, &headers).await?;
             let path = format!("/jobs/{}/result", job.id).try_into();
@@ -134,10 +159,7 @@ pub async fn inpaint_later(
         }
         JobState::Error => failed(&job, id),
         JobState::Waiting | JobState::Running | JobState::Cancelled => accepted(&job),
-    };
-    let applied = preferences.applied();
-    answer.headers_mut().insert(PREFERENCE_APPLIED, applied);
-    Ok(answer)
+    })
 }
 
 /// Receives a scan and makes its job, or finds that of an earlier request with the same key.

@@ -7,28 +7,32 @@ use std::{sync::Arc, time::Duration};
 
 use bytes::Bytes;
 use darn_jobs::{Attempt, ClaimedJob, Failure, JobError, Jobs, Progress, StopReason};
+use opentelemetry::{
+    Context,
+    trace::{FutureExt as _, TraceContextExt as _},
+};
 use tokio::{io::AsyncReadExt as _, select, task::JoinSet, time::sleep};
 use tokio_util::sync::CancellationToken;
 use tracing::{Instrument as _, error, info, info_span, warn};
 
 use super::{
-    app::App,
+    app::{App, DurableSize},
     counted::{counted, take},
     error::RequestError,
     job_request::JobRequest,
     pool::JobTurn,
     response::{self, KeptMend, MendResponse},
+    traces,
 };
+use darn_budget::Listener;
 use darn_contract::codes;
 
 /// The stage of a job that waits.
 pub const WAITING: &str = "waiting";
-/// The stage in which the input is read.
+/// The stage in which the input is read. Those that follow are the mender's.
 pub const READING: &str = "reading";
-/// The stage in which the scan is mended.
-pub const MENDING: &str = "mending";
-/// The stage in which the result is written.
-pub const WRITING: &str = "writing";
+/// The stage in which the result is stored.
+const STORING: &str = "storing";
 
 /// How often a job that is mended looks whether it is to stop.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
@@ -65,15 +69,26 @@ impl JobWorker {
             app: Arc::clone(app),
             jobs: Arc::clone(jobs),
             stop,
-            name: format!("process {}", std::process::id()),
+            name: format!(
+                "instance {}, process {}",
+                app.instance.name(),
+                std::process::id()
+            ),
         }
     }
 
-    /// Runs jobs once `ready` is, until the service shuts down; then gives back those that run and closes the database.
+    /// Runs jobs once `ready` is, until the service shuts down; then gives back those that run and closes the database. All the time it
+    /// says that this instance lives.
     pub async fn work_once(self, ready: impl Future<Output = ()>) {
-        let house = tokio::spawn({
+        let instance = self.app.instance.name().to_string();
+        let mut beside = JoinSet::new();
+        beside.spawn({
             let jobs = Arc::clone(&self.jobs);
             async move { jobs.keep_house().await }
+        });
+        beside.spawn({
+            let (jobs, instance) = (Arc::clone(&self.jobs), instance.clone());
+            async move { jobs.live_as(&instance).await }
         });
         let jobs = Arc::clone(&self.jobs);
         let worker = Arc::new(self);
@@ -81,7 +96,10 @@ impl JobWorker {
             () = worker.stop.cancelled() => {}
             () = ready => worker.claim_and_run().await,
         }
-        house.abort();
+        beside.shutdown().await;
+        if let Err(error) = jobs.store().instance_ends(&instance).await {
+            warn!(?error, "the database was not told that this instance ends");
+        }
         jobs.close().await;
     }
 
@@ -90,8 +108,13 @@ impl JobWorker {
         while let Some((claimed, turn)) = self.next().await {
             let span = info_span!("job", id = %claimed.job().id);
             let worker = Arc::clone(self);
-            let run = async move { worker.run(claimed, turn).await };
-            running.spawn(run.instrument(span));
+            let job = claimed.job();
+            let trace = traces::job_span(&job.id.to_string(), job.attempt, job.trace.as_deref());
+            let run = async move {
+                worker.run(claimed, turn).await;
+                Context::current().span().end();
+            };
+            running.spawn(run.with_context(trace).instrument(span));
             while running.try_join_next().is_some() {}
         }
         while running.join_next().await.is_some() {}
@@ -137,7 +160,10 @@ impl JobWorker {
         };
         let ended = match worked {
             Worked::Mended(mend) => self.finish(&mut claimed, mend).await,
-            Worked::Failed(error) => fail(&mut claimed, &error).await,
+            Worked::Failed(error) => {
+                traces::note_failure(error.code().word);
+                fail(&mut claimed, &error).await
+            }
             Worked::NoMemory => {
                 select! {
                     () = self.stop.cancelled() => {}
@@ -189,13 +215,14 @@ impl JobWorker {
         let app = Arc::clone(&self.app);
         let work = move |mender: &dyn darn_contract::port::Mender,
                          budget: &darn_budget::Budget<'_>| {
-            report(&attempt, MENDING);
             let mended = mender.inpaint(scan, &constraints, budget)?;
             let mended = mender.repacked(mended, form, budget)?;
             Ok(MendResponse::from(mended).keep(&app.metrics))
         };
         let bytes = usize::try_from(claimed.job().bytes).unwrap_or(usize::MAX);
-        self.app.run_durable(turn, bytes, work).await
+        let listener = Listener::new(move |progress| tell(&attempt, progress));
+        let size = DurableSize { bytes, listener };
+        self.app.run_durable(turn, size, work).await
     }
 
     async fn read_input(&self, claimed: &mut ClaimedJob) -> Result<Bytes, RequestError> {
@@ -209,7 +236,7 @@ impl JobWorker {
     }
 
     async fn finish(&self, claimed: &mut ClaimedJob, mend: KeptMend) -> Result<(), JobError> {
-        report(&claimed.attempt(), WRITING);
+        report(&claimed.attempt(), STORING);
         let KeptMend {
             answer,
             bytes,
@@ -245,7 +272,17 @@ async fn told_to_stop(attempt: &Attempt) -> StopReason {
     }
 }
 
-/// The stages have no counts: a mend does not tell how far it is.
+/// Passes on how far the mender is.
+fn tell(attempt: &Attempt, progress: darn_budget::Progress) {
+    let count = |pieces| i64::try_from(pieces).unwrap_or(i64::MAX);
+    attempt.report(Progress {
+        stage: progress.stage.to_owned(),
+        hole: count(progress.done),
+        holes: count(progress.all),
+    });
+}
+
+/// Tells of a stage without counts.
 fn report(attempt: &Attempt, stage: &str) {
     attempt.report(Progress {
         stage: stage.to_owned(),

@@ -51,6 +51,18 @@ impl KeptSession {
         Ok(patches)
     }
 
+    /// The patches as a drag shows them; the constraints are not remembered.
+    ///
+    /// # Errors
+    /// The mender's refusal.
+    pub fn draft(
+        &self,
+        constraints: &Constraints,
+        budget: &Budget<'_>,
+    ) -> Result<Vec<u8>, Refusal> {
+        self.session.draft(constraints, budget)
+    }
+
     /// The whole scan, mended with the remembered constraints.
     ///
     /// # Errors

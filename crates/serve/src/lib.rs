@@ -18,8 +18,10 @@ mod connections;
 mod content_coding;
 mod counted;
 mod digest;
+mod door;
 mod editor;
 mod ended_sessions;
+mod entity_tag;
 mod error;
 mod fair_queue;
 /// The gRPC service of `proto/darn/v1/darn.proto` and a client of it, as generated.
@@ -29,6 +31,7 @@ pub mod generated {
 }
 mod grpc;
 mod healthcheck;
+mod instance;
 mod job_answer;
 mod job_events;
 mod job_message;
@@ -53,6 +56,7 @@ mod quota;
 mod quota_check;
 mod request_body;
 mod response;
+mod result_cache;
 mod routes;
 mod scan_files;
 mod schema;
@@ -62,6 +66,8 @@ mod session_store;
 mod shutdown;
 mod telemetry;
 mod threads;
+mod tls;
+mod traces;
 mod uploads;
 
 use std::{
@@ -79,17 +85,19 @@ use tokio::{net::TcpListener, runtime, task, time};
 use tokio_util::sync::CancellationToken;
 use tracing::{error, info, warn};
 
-use self::job_worker::JobWorker;
 pub use self::{
     app::App,
     config::{ServeArgs, duration},
-    healthcheck::{HealthError, healthcheck},
+    healthcheck::{HealthError, Listening, healthcheck},
     key_file::{EntryDigest, Expiry, KeyEntry, KeyId, Scope},
     key_secret::{Secret, SecretDigest},
     keys::KeyFileError,
     log_queue::{LogGuard, write_to_stderr},
     telemetry::{LogDelivery, LogError, LogFormat, start_logging},
+    tls::TlsError,
+    traces::{TraceGuard, start_traces},
 };
+use self::{connections::Listener, job_worker::JobWorker};
 use darn_contract::{error_chain, port::Mender};
 
 /// How often metric samples are aggregated and idle sessions ended.
@@ -122,7 +130,12 @@ pub enum ServeError {
     /// Threads, signals or sockets failed.
     #[error("the service failed: {0}")]
     Io(#[from] io::Error),
-    /// The folder of the jobs cannot be used.
+    /// A process without workers would be alone with its jobs.
+    #[error(
+        "a process without workers (--workers 0, DARN_WORKERS) hands all its work to others: it needs the database that it shares with them (--database, DARN_DATABASE)"
+    )]
+    AloneWithoutWorkers,
+    /// The folder or the database of the jobs cannot be used.
     #[error("the jobs in {} cannot be opened: {}", .folder.display(), error_chain(.source))]
     Jobs {
         /// The folder of the settings (DARN_DATA).
@@ -141,6 +154,9 @@ pub enum ServeError {
     /// The file of the keys cannot be used.
     #[error(transparent)]
     Keys(#[from] KeyFileError),
+    /// The certificate cannot be used.
+    #[error(transparent)]
+    Tls(#[from] TlsError),
     /// The warm-up mend failed, so no request could succeed.
     #[error("the warm-up mend failed: {0}")]
     WarmUp(String),
@@ -149,13 +165,16 @@ pub enum ServeError {
 /// Serves until SIGTERM or SIGINT, or until something fails; blocks. Must not be called from an async runtime.
 ///
 /// # Errors
-/// An address that cannot be bound or that no key guards, a file of keys that is not valid, a failed warm-up, or an I/O error; see
+/// An address that cannot be bound or that no key guards, a file of keys or a certificate that is not valid, a failed warm-up, or an I/O error; see
 /// [`ServeError`].
 pub fn run(settings: &ServeArgs, mender: Arc<dyn Mender>) -> Result<(), ServeError> {
     if let Some(address) = settings.exposed() {
         return Err(ServeError::Exposed { address });
     }
     let async_threads = thread::available_parallelism().map_or(1, NonZero::get);
+    if settings.workers() == 0 && settings.database.is_none() {
+        return Err(ServeError::AloneWithoutWorkers);
+    }
     // One more for what blocks: the runtime starts others only if it can.
     let count = async_threads + settings.workers() + 1;
     threads::check(count).map_err(|source| ServeError::Threads { count, source })?;
@@ -218,11 +237,17 @@ pub async fn serve(
     stop: CancellationToken,
     drain: Duration,
 ) -> Result<(), ServeError> {
-    info!(address = %sockets.http.local_addr()?, "listening");
+    let tls = app.certificate.is_some();
+    let instance = app.instance.name();
+    info!(address = %sockets.http.local_addr()?, tls, %instance, "listening");
     let mut listeners = tokio::task::JoinSet::new();
     let listen = |socket, router| {
-        let table = Arc::clone(&app.connections);
-        connections::serve(socket, router, table, stop.clone())
+        let listener = Listener {
+            router,
+            table: Arc::clone(&app.connections),
+            certificate: app.certificate.clone(),
+        };
+        connections::serve(socket, listener, stop.clone())
     };
     if let Some(socket) = sockets.grpc {
         info!(address = %socket.local_addr()?, "listening for grpc alone");
@@ -232,7 +257,14 @@ pub async fn serve(
         listeners.spawn(listen(sockets.http, router(&app)));
     }
     let upkeep = tokio::spawn(upkeep(Arc::clone(&app)));
-    let watching = (app.keys.clone()).map(|keys| tokio::spawn(keys.watch()));
+    // Their drop ends them.
+    let mut watching = tokio::task::JoinSet::new();
+    if let Some(keys) = app.keys.clone() {
+        watching.spawn(keys.watch());
+    }
+    if let Some(certificate) = app.certificate.clone() {
+        watching.spawn(certificate.watch());
+    }
     let drained = tokio::spawn({
         let (app, stop) = (Arc::clone(&app), stop.clone());
         async move {
@@ -244,11 +276,16 @@ pub async fn serve(
     let warm = CancellationToken::new();
     let working = app.jobs.as_ref().map(|jobs| {
         let worker = JobWorker::new(&app, jobs, stop.clone());
+        // Only a worker of this process makes it warm: without one it claims no job.
         tokio::spawn(worker.work_once(warm.clone().cancelled_owned()))
     });
     let warm_up = {
         let (app, stop) = (Arc::clone(&app), stop.clone());
         async move {
+            if !app.has_workers() {
+                info!("ready without workers");
+                return Ok(());
+            }
             let outcome = app.warm_up().await;
             match &outcome {
                 Ok(()) => {
@@ -284,9 +321,7 @@ pub async fn serve(
     }
     upkeep.abort();
     drained.abort();
-    if let Some(watching) = watching {
-        watching.abort();
-    }
+    watching.shutdown().await;
     if warm_up.is_finished() {
         if let Ok(Err(error)) = warm_up.await {
             return Err(ServeError::WarmUp(error.to_string()));

@@ -176,6 +176,11 @@ fn mended(description: &str, part: &str, media_types: &[&str]) -> Value {
                 "schema": { "type": "string" }
             },
             "repr-digest": repr_digest(),
+            "etag": { "description": "The body's SHA-256; absent with multipart/mixed", "schema": { "type": "string" } },
+            "cache-status": {
+                "description": "Whether the answer was kept from an identical request (RFC 9211); only where the service keeps some",
+                "schema": { "type": "string" }
+            },
             "darn-loops-skipped": { "description": "Boundary loops left as they were", "schema": { "type": "integer" } },
             "darn-anchor-distance": {
                 "description": "Largest distance between the cloth and an anchor, those of gestures included, in the scene's unit; \

@@ -94,31 +94,40 @@ impl Parameters for HolesQuery {
     }
 }
 
-/// Reads the query of a URL, such as `suspects=true`; a name alone counts as true.
+/// Reads the query of `/holes`: `suspects=true`.
 ///
 /// # Errors
 /// `Malformed` for a name or a value that is not known.
 pub fn holes_query(query: Option<&str>) -> Result<HolesQuery, RequestError> {
-    let mut wanted = HolesQuery::default();
-    for pair in query
-        .unwrap_or_default()
-        .split('&')
-        .filter(|p| !p.is_empty())
-    {
-        let (name, value) = pair.split_once('=').unwrap_or((pair, "true"));
-        wanted.suspects = match (name, value) {
-            ("suspects", "true") => true,
-            ("suspects", "false") => false,
+    flag(query, "suspects").map(|suspects| HolesQuery { suspects })
+}
+
+/// Reads the query of `/sessions/{id}/inpaint`: `draft=true`.
+///
+/// # Errors
+/// `Malformed` for a name or a value that is not known.
+pub fn is_draft(query: Option<&str>) -> Result<bool, RequestError> {
+    flag(query, "draft")
+}
+
+/// Reads the query of a URL that may set one flag, such as `suspects=true`; its name alone counts as true.
+fn flag(query: Option<&str>, known: &str) -> Result<bool, RequestError> {
+    let pairs = query.unwrap_or_default().split('&');
+    let mut is_set = false;
+    for pair in pairs.filter(|pair| !pair.is_empty()) {
+        is_set = match pair.split_once('=').unwrap_or((pair, "true")) {
+            (name, "true") if name == known => true,
+            (name, "false") if name == known => false,
             _ => {
                 let detail = format!(
-                    "`{}` is not known; the URL's query is `suspects=true` or `suspects=false`",
+                    "`{}` is not known; the URL's query is `{known}=true` or `{known}=false`",
                     excerpt(pair)
                 );
                 return Err(RequestError::Malformed(detail));
             }
         };
     }
-    Ok(wanted)
+    Ok(is_set)
 }
 
 /// Allows only constraints that deform cloth: those of a request to an open session, whose holes and weights are already chosen.

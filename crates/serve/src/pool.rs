@@ -14,6 +14,7 @@ use std::{
     time::Duration,
 };
 
+use opentelemetry::Context;
 use tokio::{
     sync::{Notify, oneshot},
     time::{Instant, timeout_at},
@@ -249,6 +250,7 @@ impl Pool {
             limits,
             queued_at: Instant::now(),
             span: Span::current(),
+            trace: Context::current(),
             permit,
         };
         let pushed = self.0.push(client, cost, Box::new(job));

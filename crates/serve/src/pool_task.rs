@@ -4,10 +4,11 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use opentelemetry::Context;
 use tokio::{sync::oneshot, time::Instant};
 use tracing::{Span, warn};
 
-use super::telemetry::PoolMetrics;
+use super::{telemetry::PoolMetrics, traces};
 use darn_budget::{Budget, Limits};
 
 /// Why a job has no result.
@@ -69,6 +70,8 @@ pub struct PoolTask<T, W, P> {
     pub queued_at: Instant,
     /// The log span of its request.
     pub span: Span,
+    /// Its place in its request's trace.
+    pub trace: Context,
     /// Its place; given back when it ends.
     pub permit: P,
 }
@@ -94,10 +97,13 @@ impl<T: Send, W: FnOnce(&Budget<'_>) -> T + Send, P: Send> QueuedTask for PoolTa
             deadline,
             limits,
             span,
+            trace,
+            queued_at,
             permit,
-            ..
         } = *self;
         let _entered = span.enter();
+        let _traced = trace.attach();
+        traces::past_span("queue", queued_at.elapsed());
         let cancelled = || !is_waited_for(&reply, deadline);
         let limits = Limits {
             deadline: Some(deadline.into_std()),

@@ -12,6 +12,7 @@ use uuid::Uuid;
 
 use super::{
     digest::{self, REPR_DIGEST},
+    entity_tag,
     media_types::{GLB, JSON, MULTIPART_MIXED, OCTET_STREAM},
     telemetry::Metrics,
 };
@@ -123,6 +124,18 @@ pub struct KeptMend {
     pub report: Vec<u8>,
 }
 
+impl KeptMend {
+    /// The answer in the media type that the caller prefers, as [`MendResponse::render`] writes it; to be called on a worker.
+    pub fn render(&self, preferred: &str) -> Response {
+        match preferred {
+            MULTIPART_MIXED => self
+                .answer
+                .with_report(self.bytes.clone(), self.report.clone()),
+            _ => (self.answer.headers(), Body::from(self.bytes.clone())).into_response(),
+        }
+    }
+}
+
 /// What goes with a mended scan in an answer, as it is kept with a job.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct KeptAnswer {
@@ -171,13 +184,20 @@ impl KeptAnswer {
                 .map(|value| (header::CONTENT_TYPE, value)),
         );
         headers.insert(NO_STORE.0, HeaderValue::from_static(NO_STORE.1));
+        let tag = headers.get(REPR_DIGEST).and_then(entity_tag::of_digest);
+        headers.extend(tag.map(|tag| (header::ETAG, tag)));
         headers
     }
 
     /// An answer of the scan with its report, in multipart/mixed; to be called on a thread that may block.
     pub fn with_report(&self, bytes: Vec<u8>, report: Vec<u8>) -> Response {
         let mut headers = self.headers();
-        for replaced in [header::CONTENT_TYPE, header::CACHE_CONTROL, REPR_DIGEST] {
+        for replaced in [
+            header::CONTENT_TYPE,
+            header::CACHE_CONTROL,
+            header::ETAG,
+            REPR_DIGEST,
+        ] {
             headers.remove(replaced);
         }
         let file = FilePart {
@@ -206,6 +226,12 @@ pub fn stripped(stripped: Stripped, preferred: &str) -> Response {
     file.render(report, headers)
 }
 
+/// The answer of patches as a drag shows them.
+pub fn draft(bytes: Vec<u8>) -> Response {
+    let headers = [(header::CONTENT_TYPE, OCTET_STREAM), NO_STORE];
+    (headers, bytes).into_response()
+}
+
 /// A file to answer with.
 struct FilePart {
     /// Name of its part in multipart/mixed.
@@ -221,7 +247,14 @@ impl FilePart {
             Some(report) => self.multipart(&report),
             None => (self.media_type, self.bytes),
         };
-        headers.extend(digest::of(&body).map(|value| (REPR_DIGEST, value)));
+        let digest = digest::of(&body);
+        // Each multipart answer has a boundary of its own.
+        let tag = match media_type.starts_with(MULTIPART_MIXED) {
+            true => None,
+            false => digest.as_ref().and_then(entity_tag::of_digest),
+        };
+        headers.extend(digest.map(|value| (REPR_DIGEST, value)));
+        headers.extend(tag.map(|value| (header::ETAG, value)));
         let media_type = [(header::CONTENT_TYPE, media_type)];
         let body = Body::from(body);
         (StatusCode::OK, media_type, [NO_STORE], headers, body).into_response()

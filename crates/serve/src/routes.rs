@@ -10,6 +10,7 @@ use axum::{
     response::{IntoResponse, Response},
     routing::{get, post},
 };
+use opentelemetry::trace::FutureExt as _;
 use tokio::task;
 use tower_http::{
     catch_panic::CatchPanicLayer,
@@ -25,6 +26,7 @@ use super::{
     client::Caller,
     counted::counted_answer,
     digest::{CONTENT_DIGEST, REPR_DIGEST},
+    door::refuse_work,
     error::RequestError,
     job_events::LAST_EVENT_ID,
     job_request::IDEMPOTENCY_KEY,
@@ -34,9 +36,11 @@ use super::{
     prefer::{PREFER, PREFERENCE_APPLIED, Preferences},
     quota_check::{RATELIMIT, RATELIMIT_POLICY},
     response::{self, ANCHOR_DISTANCE, HOLES_FILLED, LOOPS_SKIPPED, MendResponse, RESULT, STRIP},
+    result_cache::{CACHE_STATUS, CacheStatus, RequestKey},
     scan_files::AnswerForm,
     service_info, session_routes,
     telemetry::{REQUEST_ID, RequestId},
+    traces,
 };
 use darn_contract::{Constraints, Search, excerpt};
 use darn_jobs::State as JobState;
@@ -59,13 +63,14 @@ pub fn routes() -> Router<Arc<App>> {
         .method_not_allowed_fallback(|| async { RequestError::MethodNotAllowed })
 }
 
-/// Adds the layers around all routes of a listener: panics, keys, CORS, the check of the host, and outermost what every answer gets: request
+/// Adds the layers around all routes of a listener: panics, the lack of workers, keys, CORS, the check of the host, and outermost what every answer gets: request
 /// ids, problem documents, metrics, the log.
 pub fn finish(routes: Router<Arc<App>>, app: &Arc<App>) -> Router {
     routes
         .layer(CatchPanicLayer::custom(|_| {
             RequestError::Internal.into_response()
         }))
+        .layer(middleware::from_fn_with_state(Arc::clone(app), refuse_work))
         .layer(middleware::from_fn_with_state(Arc::clone(app), authorize))
         .layer(cors(&app.allow_origin))
         .layer(middleware::from_fn_with_state(Arc::clone(app), check_host))
@@ -101,6 +106,8 @@ fn cors(origins: &[String]) -> CorsLayer {
         .expose_headers([
             HOLES_FILLED,
             LOOPS_SKIPPED,
+            CACHE_STATUS,
+            header::ETAG,
             RESULT,
             STRIP,
             REPR_DIGEST,
@@ -145,10 +152,15 @@ async fn observe(State(app): State<Arc<App>>, mut request: Request, next: Next) 
         .map_or("(none)", MatchedPath::as_str)
         .to_owned();
     let method = excerpt(request.method().as_str());
-    let span = info_span!("request", id = id.0, %method, route, key = Empty);
+    let span = info_span!("request", id = id.0, %method, route, key = Empty, trace = Empty);
+    let trace = traces::request_span(request.headers(), &method, &route);
+    if let Some(id) = traces::trace_id(&trace) {
+        span.record("trace", id);
+    }
     request.extensions_mut().insert(id.clone());
 
-    let mut response = next.run(request).instrument(span.clone()).await;
+    let answered = next.run(request).instrument(span.clone());
+    let mut response = answered.with_context(trace.clone()).await;
     let error = response.extensions_mut().remove::<RequestError>();
     if let Some(error) = &error {
         response = error.render(&id.0, std::mem::take(response.headers_mut()));
@@ -161,6 +173,7 @@ async fn observe(State(app): State<Arc<App>>, mut request: Request, next: Next) 
     let status = response.status().as_u16();
     app.metrics.answered(&route, status, started.elapsed());
     let code = error.as_ref().map(|error| error.code().word);
+    traces::end_request(&trace, status, code);
     span.in_scope(|| {
         info!(
             status,
@@ -175,9 +188,20 @@ async fn observe(State(app): State<Arc<App>>, mut request: Request, next: Next) 
 async fn inpaint(State(app): State<Arc<App>>, request: Request) -> Result<Response, RequestError> {
     let preferences = Preferences::of(request.headers());
     // A preference that the caller's key does not allow is passed over, as any that cannot be followed.
-    let wants_job = preferences.respond_async && Caller::of(request.extensions()).may_hand_over();
-    if let (true, Some(jobs)) = (wants_job, &app.jobs) {
-        return job_routes::inpaint_later(&app, jobs, request, preferences).await;
+    let may_hand_over = Caller::of(request.extensions()).may_hand_over();
+    let jobs = app.jobs.as_ref().filter(|_| may_hand_over);
+    match jobs {
+        Some(jobs) if preferences.respond_async => {
+            return job_routes::inpaint_later(&app, jobs, request, preferences).await;
+        }
+        Some(jobs) if !app.has_workers() => {
+            return job_routes::inpaint_elsewhere(&app, jobs, request).await;
+        }
+        None if !app.has_workers() => {
+            body::discard(request, &app.limits);
+            return Err(RequestError::NoWorkers);
+        }
+        _ => {}
     }
     let headers = request.headers().clone();
     let ScanRequest {
@@ -190,11 +214,27 @@ async fn inpaint(State(app): State<Arc<App>>, request: Request) -> Result<Respon
     let AnswerForm { media_type, form } = files.answer(&headers);
     let service = Arc::clone(&app);
     app.submit(upload, scan.len(), move |mender, budget| {
+        let known = (service.results.as_ref())
+            .map(|results| (results, RequestKey::of(&scan, &constraints, form)));
+        if let Some(mend) = known.as_ref().and_then(|(results, key)| results.get(key)) {
+            return Ok(with_status(mend.render(media_type), CacheStatus::Hit));
+        }
         let mended = mender.inpaint(scan, &constraints, budget)?;
         let mended = mender.repacked(mended, form, budget)?;
-        Ok(MendResponse::from(mended).render(media_type, &service.metrics))
+        let response = MendResponse::from(mended);
+        let Some((results, key)) = known else {
+            return Ok(response.render(media_type, &service.metrics));
+        };
+        let mend = Arc::new(response.keep(&service.metrics));
+        let status = results.keep(key, &mend);
+        Ok(with_status(mend.render(media_type), status))
     })
     .await
+}
+
+fn with_status(mut answer: Response, status: CacheStatus) -> Response {
+    answer.headers_mut().insert(CACHE_STATUS, status.value());
+    answer
 }
 
 async fn holes(State(app): State<Arc<App>>, request: Request) -> Result<Response, RequestError> {

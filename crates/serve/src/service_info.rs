@@ -17,6 +17,8 @@ use super::{
 struct Info {
     /// darn's version.
     version: &'static str,
+    /// This process among those that serve together: the ids of its sessions begin with it.
+    instance: String,
     /// Whether the service keeps jobs.
     jobs: bool,
     limits: InfoLimits,
@@ -54,6 +56,7 @@ struct InfoLimits {
 pub async fn answer(State(app): State<Arc<App>>, caller: Caller) -> Response {
     response::json_response(response::json(&Info {
         version: env!("CARGO_PKG_VERSION"),
+        instance: app.instance.name().to_string(),
         jobs: app.jobs.is_some(),
         limits: InfoLimits {
             body_bytes: app.limits.body,

@@ -36,19 +36,21 @@ pub fn routes() -> Router<Arc<App>> {
         .route("/sessions/{id}/result", get(result))
 }
 
-/// The session id in a path.
+/// The session id in a path, if this process would keep its session.
 struct SessionId(Uuid);
 
-impl<S: Send + Sync> FromRequestParts<S> for SessionId {
+impl FromRequestParts<Arc<App>> for SessionId {
     type Rejection = RequestError;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, RequestError> {
+    async fn from_request_parts(parts: &mut Parts, app: &Arc<App>) -> Result<Self, RequestError> {
         // A text that is not an id is an unknown session.
-        let unknown = RequestError::Session(SessionError::Unknown);
-        let Ok(Path(text)) = Path::<String>::from_request_parts(parts, state).await else {
-            return Err(unknown);
+        let unknown = SessionError::Unknown;
+        let Ok(Path(text)) = Path::<String>::from_request_parts(parts, app).await else {
+            return Err(unknown.into());
         };
-        Uuid::try_parse(&text).map(Self).map_err(|_| unknown)
+        let id = Uuid::try_parse(&text).map_err(|_| unknown)?;
+        app.check_session_place(id).await?;
+        Ok(Self(id))
     }
 }
 
@@ -65,7 +67,7 @@ async fn open(State(app): State<Arc<App>>, request: Request) -> Result<Response,
         ..
     } = body::receive_scan::<Constraints>(&app, request).await?;
     let constraints = parameters::only_selection(parameters.unwrap_or_default())?;
-    let (id, sessions) = (Uuid::new_v4(), Arc::clone(&app.sessions));
+    let (id, sessions) = (app.instance.session_id(), Arc::clone(&app.sessions));
     let idle_seconds = sessions.limits().idle.as_secs_f64();
     let job = app.submit(upload, scan.len(), move |mender, budget| {
         let session = mender.open(scan, &constraints, budget)?;
@@ -102,6 +104,13 @@ async fn inpaint(
     SessionId(id): SessionId,
     request: Request,
 ) -> Result<Response, RequestError> {
+    let is_draft = match parameters::is_draft(request.uri().query()) {
+        Ok(is_draft) => is_draft,
+        Err(error) => {
+            body::discard(request, &app.limits);
+            return Err(error);
+        }
+    };
     let media_type = preferred(request.headers(), &[GLB, OCTET_STREAM, MULTIPART_MIXED]);
     // Also the form of the patches inside multipart/mixed.
     let form = match preferred(request.headers(), &[GLB, OCTET_STREAM]) {
@@ -110,6 +119,12 @@ async fn inpaint(
     };
     let SessionRequest { parameters, upload } = receive::<Constraints>(&app, id, request).await?;
     let constraints = parameters::only_edits(parameters.unwrap_or_default())?;
+    if is_draft {
+        let draft = app.submit_to_session(id, upload, move |session, budget| {
+            session.draft(&constraints, budget)
+        });
+        return Ok(response::draft(draft.await?));
+    }
     let service = Arc::clone(&app);
     app.submit_to_session(id, upload, move |session, budget| {
         let patches = session.patches(&constraints, form, budget)?;

@@ -18,6 +18,7 @@ use uuid::Uuid;
 use super::{
     client::{Client, may_use},
     ended_sessions::{End, EndReason, EndedSessions},
+    instance::InstanceName,
     kept_session::KeptSession,
     quota::Exceeded,
     telemetry::SessionMetrics,
@@ -40,6 +41,12 @@ pub enum SessionError {
     /// It has ended.
     #[error("{0}; POST /sessions opens it anew")]
     Ended(EndReason),
+    /// The process that kept it has ended.
+    #[error("the process that kept this session has ended; POST /sessions opens it anew")]
+    Lost,
+    /// Another process keeps it.
+    #[error("this session is kept by the instance {0}; send the request there")]
+    Elsewhere(InstanceName),
     /// Too many requests use it or wait for it.
     #[error(
         "{limit} requests for this session are under way, which is all it takes; wait for their answers"

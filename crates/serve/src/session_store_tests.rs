@@ -43,6 +43,10 @@ impl EditSession for SizedSession {
         Ok(Patches { bytes, report })
     }
 
+    fn draft(&self, _: &Constraints, _: &Budget<'_>) -> Result<Vec<u8>, Refusal> {
+        unreachable!("the store asks for no drafts")
+    }
+
     fn mended(&self, constraints: &Constraints, _: &Budget<'_>) -> Result<Mended, Refusal> {
         let bytes = vec![0; constraints.anchors.len()];
         let report = v1::Report::default();

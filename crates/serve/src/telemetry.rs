@@ -20,7 +20,10 @@ use tracing_subscriber::util::SubscriberInitExt;
 use tracing_subscriber::{Registry, registry};
 use uuid::Uuid;
 
-use super::log_queue::{self, LogGuard, LogQueue, PatientStderr};
+use super::{
+    log_queue::{self, LogGuard, LogQueue, PatientStderr},
+    traces,
+};
 use darn_contract::v1;
 
 /// The header that carries a request's id, in requests and answers.
@@ -312,8 +315,9 @@ impl Metrics {
             .record(took.as_secs_f64());
     }
 
-    /// Records the holes and the stage timings of a mend.
+    /// Records the holes and the stage timings of a mend, also in the present trace.
     pub fn mended(&self, report: &v1::Report) {
+        traces::stage_spans(report);
         self.counter("darn_holes_filled_total", Vec::new())
             .increment(report.holes.len() as u64);
         if let Some(t) = &report.timings {

@@ -6,6 +6,7 @@ mod claims;
 mod files;
 #[cfg(target_os = "linux")]
 mod full_disk;
+mod instances;
 mod kills;
 mod model;
 mod postgres;

@@ -277,6 +277,7 @@ impl Model {
                     name: None,
                     priority,
                     webhook: None,
+                    trace: None,
                     request: "{}".to_owned(),
                     state: State::Waiting,
                     version: 1,

@@ -22,6 +22,11 @@ law! {
         let Submitted::Repeated(again) = again else { panic!("{again:?}") };
         assert_eq!((again.id, again.state), (first.id, State::Error));
 
+        // Where it stands in a trace is no part of the payload.
+        let traced = Submission { trace: Some("00-1-2-01".to_owned()), ..with_key("client", "key") };
+        let again = jobs.submit(traced, &b"scan"[..]).await.unwrap().into_job();
+        assert_eq!((again.id, again.trace), (first.id, None));
+
         // Any part of the payload makes another one of it.
         let others = [
             (with_key("client", "key"), &b"another scan"[..]),

@@ -58,14 +58,15 @@ pub(super) fn delete() -> Value {
 pub(super) fn inpaint() -> Value {
     let patches = mended(
         "The patches alone: as a GLB, or as positions on the session's topology: patch after patch, in order of hole id, x, y, z of \
-            every vertex as little-endian 32-bit floats, in the order of `patchUvs`",
+            every vertex as little-endian 32-bit floats, in the order of `patchUvs`. With `draft=true`: those positions of the session's holes, then \
+            the normals of all vertices in the same order, and neither report nor headers of one",
         "patches",
         &[GLB, OCTET_STREAM],
     );
     json!({
         "summary": "Fill the holes of a session",
         "operationId": "inpaintSession",
-        "parameters": [id()],
+        "parameters": [id(), draft()],
         "requestBody": json_body("Constraints", "Anchors and edits; left out, the cloth as it is without any"),
         "responses": with(
             responses(
@@ -75,6 +76,15 @@ pub(super) fn inpaint() -> Value {
             ),
             &SESSION_ERRORS,
         ),
+    })
+}
+
+fn draft() -> Value {
+    json!({
+        "name": "draft",
+        "in": "query",
+        "description": "While something is dragged: the patches at once, not measured, without a report; `GET /sessions/{id}/result` does not take note of it",
+        "schema": {"type": "boolean", "default": false},
     })
 }
 
@@ -109,11 +119,15 @@ pub(super) fn result() -> Value {
 }
 
 /// Errors of a route that names a session.
-const SESSION_ERRORS: [(&str, &str); 3] = [
+const SESSION_ERRORS: [(&str, &str); 4] = [
     ("404", "There is no session of this id"),
     (
         "410",
-        "The session is gone: `session_expired`, `session_evicted` or `session_deleted`",
+        "The session is gone: `session_expired`, `session_evicted`, `session_deleted` or `session_lost`",
+    ),
+    (
+        "421",
+        "Another process keeps the session (`session_elsewhere`), or this one has no workers (`no_workers`)",
     ),
     ("429", "Too many requests for this session are under way"),
 ];

@@ -1,76 +1,24 @@
 //! The binary as a user meets it: `darn serve` on a real socket, and the commands beside it.
 
-use std::io::{BufRead, BufReader};
-use std::net::SocketAddr;
-use std::process::{Child, Command, Stdio};
+mod many;
+#[path = "../../crates/jobs/tests/laws/postgres.rs"]
+mod postgres;
+mod running;
+mod traces;
 
-const EXAMPLE: &[u8] = include_bytes!("../examples/scarf_hole.glb");
+use running::Service;
+use std::process::Command;
+
+const EXAMPLE: &[u8] = include_bytes!("../../examples/scarf_hole.glb");
 
 fn darn() -> Command {
     Command::new(env!("CARGO_BIN_EXE_darn"))
 }
 
-/// A running `darn serve`; killed when dropped.
-struct Service {
-    child: Child,
-    address: SocketAddr,
-}
-
-impl Service {
-    /// Starts on a free port and waits until the log says which.
-    fn start() -> Service {
-        Service::start_with(&[])
-    }
-
-    /// The same with settings.
-    fn start_with(settings: &[&str]) -> Service {
-        let mut child = darn()
-            .args(["serve", "--listen", "127.0.0.1:0"])
-            .args(settings)
-            .stderr(Stdio::piped())
-            .stdout(Stdio::null())
-            .spawn()
-            .expect("darn starts");
-        let mut lines = BufReader::new(child.stderr.take().expect("piped")).lines();
-        let address = lines
-            .by_ref()
-            .map_while(Result::ok)
-            .find_map(|line| {
-                line.split("address=")
-                    .nth(1)?
-                    .split_whitespace()
-                    .next()?
-                    .parse()
-                    .ok()
-            })
-            .expect("the log names the address");
-        // The service blocks on a full pipe unless its log is read.
-        std::thread::spawn(move || lines.for_each(drop));
-        Service { child, address }
-    }
-
-    fn url(&self, path: &str) -> String {
-        format!("http://{}{path}", self.address)
-    }
-
-    /// A job, by its path.
-    async fn job(&self, client: &reqwest::Client, path: &str) -> serde_json::Value {
-        let answer = client.get(self.url(path)).send().await.expect("an answer");
-        answer.json().await.expect("JSON")
-    }
-}
-
-impl Drop for Service {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
 #[tokio::test]
 async fn the_service_and_the_command_give_the_same_bytes_and_sigterm_ends_it() {
     let mut service = Service::start();
-    let client = reqwest::Client::new();
+    let client = running::client();
     for _ in 0..600 {
         if client
             .get(service.url("/readyz"))
@@ -140,7 +88,7 @@ async fn the_service_and_the_command_give_the_same_bytes_and_sigterm_ends_it() {
 async fn jobs_outlive_a_process_that_is_killed_and_end_as_requests_do() {
     let folder = tempfile::tempdir().expect("a folder");
     let data = ["--data", folder.path().to_str().expect("a name")];
-    let client = reqwest::Client::new();
+    let client = running::client();
     let post = |service: &Service, path: &str| {
         let request = client.post(service.url(path));
         let request = request.header("content-type", "model/gltf-binary");
@@ -436,7 +384,7 @@ async fn a_new_key_opens_the_service_whose_file_has_its_entry() {
     let file = folder.path().join("keys.json");
     std::fs::write(&file, format!("{{\"keys\": [{entry}, {second}]}}")).expect("written");
     let service = Service::start_with(&["--keys", file.to_str().expect("a path")]);
-    let client = reqwest::Client::new();
+    let client = running::client();
     for (key, status) in [(&secret, 200), (&other, 401), (&expired, 401)] {
         let request = client.get(service.url("/info")).bearer_auth(key);
         assert_eq!(request.send().await.expect("an answer").status(), status);
