@@ -5,6 +5,7 @@
 //! row that names it, and deletes it after the row that names it no more.
 
 mod attempts;
+mod outbox;
 mod requests;
 mod retention;
 

@@ -14,9 +14,15 @@ use crate::error::JobError;
 struct Steps(&'static [&'static str]);
 
 /// The tables in SQLite.
-const SQLITE: Steps = Steps(&[include_str!("../../migrations/sqlite/1.sql")]);
+const SQLITE: Steps = Steps(&[
+    include_str!("../../migrations/sqlite/1.sql"),
+    include_str!("../../migrations/sqlite/2.sql"),
+]);
 /// The tables in PostgreSQL.
-const POSTGRES: Steps = Steps(&[include_str!("../../migrations/postgres/1.sql")]);
+const POSTGRES: Steps = Steps(&[
+    include_str!("../../migrations/postgres/1.sql"),
+    include_str!("../../migrations/postgres/2.sql"),
+]);
 
 impl MigrationSource<'static> for Steps {
     fn resolve(

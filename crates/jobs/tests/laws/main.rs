@@ -8,6 +8,7 @@ mod files;
 mod full_disk;
 mod kills;
 mod model;
+mod outbox;
 mod postgres;
 mod requests;
 mod running;
