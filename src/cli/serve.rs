@@ -36,9 +36,9 @@ pub fn run(settings: &ServeCommand) -> Result<(), Failure> {
     allocator::give_back_when_idle(move |unused| idle.release_idle(unused));
     match darn_serve::run(serve, Arc::new(SharedMender(mender))) {
         // Settings that are wrong, as those that clap refuses.
-        Err(error @ (ServeError::Exposed { .. } | ServeError::Keys(_))) => {
-            Err(Failure::Usage(error.to_string()))
-        }
+        Err(
+            error @ (ServeError::Exposed { .. } | ServeError::Keys(_) | ServeError::Webhooks(_)),
+        ) => Err(Failure::Usage(error.to_string())),
         outcome => outcome.or_fail("serve"),
     }
 }

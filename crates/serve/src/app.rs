@@ -29,6 +29,7 @@ use super::{
     session_store::{SessionLimits, SessionStore},
     telemetry::Metrics,
     uploads::{BodySize, UploadRefusal, UploadSlot, Uploads},
+    webhook::Webhooks,
 };
 use darn_budget::{Budget, Limits, MemoryPool};
 use darn_contract::codes;
@@ -61,6 +62,8 @@ pub struct App {
     pub sessions: Arc<SessionStore>,
     /// The durable jobs; `None` without a data folder.
     pub jobs: Option<Arc<Jobs>>,
+    /// What tells clients of their jobs' ends; there whenever the jobs are.
+    pub webhooks: Option<Arc<Webhooks>>,
     /// The keys; `None` where anybody may call.
     pub keys: Option<Arc<KeyRing>>,
     /// Cancelled when the service begins to shut down.
@@ -174,6 +177,10 @@ impl App {
             }
             None => None,
         };
+        let webhooks = match &jobs {
+            Some(_) => Some(Arc::new(Webhooks::new(&settings.webhooks)?)),
+            None => None,
+        };
         let keys = match &settings.keys {
             Some(path) => Some(KeyRing::open(path).await?),
             None => None,
@@ -210,6 +217,7 @@ impl App {
             editor: !settings.no_editor,
             sessions,
             jobs,
+            webhooks,
             keys,
             stopping: CancellationToken::new(),
             pool,
@@ -276,7 +284,10 @@ impl App {
     }
 
     /// Takes an upload permit whatever waits in the queue.
-    fn upload_slot_for(
+    ///
+    /// # Errors
+    /// `UploadsFull`, `UploadShareFull` or `Draining`.
+    pub(crate) fn upload_slot_for(
         &self,
         size: BodySize,
         client: Client,

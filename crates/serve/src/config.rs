@@ -4,7 +4,7 @@ use std::{net::SocketAddr, ops::RangeInclusive, path::PathBuf, time::Duration};
 
 use clap::Args;
 
-use super::telemetry::LogFormat;
+use super::{telemetry::LogFormat, webhook::WebhookArgs};
 
 /// Upper bound of the settings `queue` and `uploads`.
 const MAX_WAITING: usize = 65_536;
@@ -45,6 +45,10 @@ pub struct ServeArgs {
     /// Folder in which jobs are kept, which survive the process; left out, the service takes no jobs
     #[arg(long, env = "DARN_DATA", value_name = "DIR")]
     pub data: Option<PathBuf>,
+
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub webhooks: WebhookArgs,
 
     /// Scans mended at once, at most 1024; left out, two per processor
     #[arg(long, env = "DARN_WORKERS", value_name = "N", value_parser = workers)]

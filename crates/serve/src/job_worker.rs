@@ -18,6 +18,7 @@ use super::{
     job_request::JobRequest,
     pool::JobTurn,
     response::{self, KeptMend, MendResponse},
+    webhook::sender::WebhookSender,
 };
 use darn_contract::codes;
 
@@ -69,12 +70,16 @@ impl JobWorker {
         }
     }
 
-    /// Runs jobs once `ready` is, until the service shuts down; then gives back those that run and closes the database.
+    /// Runs jobs once `ready` is, and tells webhooks of ended ones, until the service shuts down; then gives back those that run and closes the
+    /// database.
     pub async fn work_once(self, ready: impl Future<Output = ()>) {
         let house = tokio::spawn({
             let jobs = Arc::clone(&self.jobs);
             async move { jobs.keep_house().await }
         });
+        let telling = self
+            .webhooks()
+            .map(|sender| tokio::spawn(sender.deliver_all()));
         let jobs = Arc::clone(&self.jobs);
         let worker = Arc::new(self);
         select! {
@@ -82,7 +87,19 @@ impl JobWorker {
             () = ready => worker.claim_and_run().await,
         }
         house.abort();
+        if let Some(telling) = telling {
+            telling.await.ok();
+        }
         jobs.close().await;
+    }
+
+    fn webhooks(&self) -> Option<WebhookSender> {
+        Some(WebhookSender {
+            app: Arc::clone(&self.app),
+            jobs: Arc::clone(&self.jobs),
+            webhooks: Arc::clone(self.app.webhooks.as_ref()?),
+            stop: self.stop.clone(),
+        })
     }
 
     async fn claim_and_run(self: &Arc<Self>) {

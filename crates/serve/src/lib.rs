@@ -28,6 +28,8 @@ pub mod generated {
     include!(concat!(env!("OUT_DIR"), "/darn.v1.rs"));
 }
 mod grpc;
+mod grpc_chunks;
+mod grpc_jobs;
 mod healthcheck;
 mod job_answer;
 mod job_events;
@@ -63,6 +65,7 @@ mod shutdown;
 mod telemetry;
 mod threads;
 mod uploads;
+mod webhook;
 
 use std::{
     io,
@@ -89,6 +92,7 @@ pub use self::{
     keys::KeyFileError,
     log_queue::{LogGuard, write_to_stderr},
     telemetry::{LogDelivery, LogError, LogFormat, start_logging},
+    webhook::{WebhookArgs, WebhookSettingsError},
 };
 use darn_contract::{error_chain, port::Mender};
 
@@ -141,6 +145,9 @@ pub enum ServeError {
     /// The file of the keys cannot be used.
     #[error(transparent)]
     Keys(#[from] KeyFileError),
+    /// The settings of webhooks cannot be used.
+    #[error(transparent)]
+    Webhooks(#[from] WebhookSettingsError),
     /// The warm-up mend failed, so no request could succeed.
     #[error("the warm-up mend failed: {0}")]
     WarmUp(String),
@@ -324,7 +331,11 @@ fn grpc_routes(app: &Arc<App>) -> Router<Arc<App>> {
     use tower::ServiceExt as _;
     let service = grpc::service(app)
         .map_request(|request: axum::extract::Request| request.map(tonic::body::Body::new));
-    Router::new().route_service("/darn.v1.Darn/{method}", service)
+    let jobs = grpc_jobs::service(app)
+        .map_request(|request: axum::extract::Request| request.map(tonic::body::Body::new));
+    Router::new()
+        .route_service("/darn.v1.Darn/{method}", service)
+        .route_service("/darn.v1.Jobs/{method}", jobs)
 }
 
 async fn upkeep(app: Arc<App>) {

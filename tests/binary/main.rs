@@ -1,10 +1,12 @@
 //! The binary as a user meets it: `darn serve` on a real socket, and the commands beside it.
 
+mod webhooks;
+
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
 use std::process::{Child, Command, Stdio};
 
-const EXAMPLE: &[u8] = include_bytes!("../examples/scarf_hole.glb");
+const EXAMPLE: &[u8] = include_bytes!("../../examples/scarf_hole.glb");
 
 fn darn() -> Command {
     Command::new(env!("CARGO_BIN_EXE_darn"))
