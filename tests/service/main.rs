@@ -8,6 +8,7 @@ mod fake;
 mod faults;
 mod grpc_jobs;
 mod harness;
+mod job_uploads;
 mod jobs;
 mod key_logs;
 mod keyed;

@@ -25,6 +25,7 @@ use super::{
     claimed::ClaimedJob,
     company::RunningJobs,
     error::JobError,
+    input::ReceivedInput,
     job::{
         Claimant, ClientCounts, Job, ListQuery, NewJob, Page, Retention, RunningLimits, State,
         Submission, Submitted,
@@ -157,17 +158,29 @@ impl Jobs {
         submission: Submission,
         input: impl AsyncRead,
     ) -> Result<Submitted, JobError> {
-        self.store.check_room().await?;
-        let id = Uuid::new_v4();
-        let name = BlobName::input(id);
-        let written = self.blobs.put(&name, input).await?;
+        let received = self.receive(input).await?;
+        self.submit_received(submission, received).await
+    }
+
+    /// [`Self::submit`] of an input that has been stored before.
+    ///
+    /// # Errors
+    /// [`JobError::IdempotencyMismatch`], [`JobError::StorageFull`]. Nothing is left then.
+    pub async fn submit_received(
+        &self,
+        submission: Submission,
+        input: ReceivedInput,
+    ) -> Result<Submitted, JobError> {
         let new = NewJob {
-            id,
-            digest: digest(&submission, &written.sha256),
+            id: input.id,
+            digest: digest(&submission, &input.written.sha256),
             submission,
-            input: name.clone(),
-            bytes: i64::try_from(written.bytes).unwrap_or(i64::MAX),
+            input: input.name.clone(),
+            bytes: i64::try_from(input.written.bytes).unwrap_or(i64::MAX),
         };
+        let name = input.name.clone();
+        // From here on a row may name it, also where this future is dropped.
+        input.keep();
         let created = self.store.create(&new).await;
         match &created {
             Ok(Submitted::New(_)) => self.wake(),

@@ -46,8 +46,8 @@ pub struct ServeArgs {
     #[arg(long, env = "DARN_DATA", value_name = "DIR")]
     pub data: Option<PathBuf>,
 
+    /// Webhooks of jobs.
     #[command(flatten)]
-    #[allow(missing_docs)]
     pub webhooks: WebhookArgs,
 
     /// Scans mended at once, at most 1024; left out, two per processor

@@ -63,31 +63,60 @@ impl ChunkPlace {
     }
 }
 
+/// The chunks of a call, within the limits of a body.
+#[derive(Debug)]
+pub struct Chunks<C> {
+    stream: Streaming<C>,
+    timer: BodyTimer,
+    place: ChunkPlace,
+    limit: usize,
+    seen: usize,
+}
+
+impl<C: DataChunk> Chunks<C> {
+    /// Those of a stream.
+    pub fn new(app: &App, stream: Streaming<C>) -> Self {
+        Self {
+            stream,
+            timer: BodyTimer::new(&app.limits),
+            place: ChunkPlace::First,
+            limit: app.limits.body,
+            seen: 0,
+        }
+    }
+
+    /// The next one, with its place.
+    ///
+    /// # Errors
+    /// `TooLarge`, `MessageTooLarge`, `BodyTimeout` or `Malformed`.
+    pub async fn next(&mut self) -> Result<Option<(C, ChunkPlace)>, RequestError> {
+        let chunk = self.timer.next(self.stream.message()).await?;
+        let Some(chunk) = chunk.map_err(|status| stream_error(&status))? else {
+            return Ok(None);
+        };
+        self.seen = self.seen.saturating_add(chunk.data().len());
+        if self.seen > self.limit {
+            return Err(RequestError::TooLarge { limit: self.limit });
+        }
+        let place = std::mem::replace(&mut self.place, ChunkPlace::Later);
+        Ok(Some((chunk, place)))
+    }
+}
+
 /// Reads the chunks of a call; answers with the scan, and gives each chunk to `read` for what it has beside that.
 ///
 /// # Errors
-/// `TooLarge`, `MessageTooLarge`, `BodyTimeout`, `EmptyBody`, `Malformed`, `MemoryFull`, and those of `read`.
+/// Those of the chunks and of `read`; `EmptyBody`, `MemoryFull`.
 pub async fn collect<C: DataChunk>(
     app: &App,
-    mut stream: Streaming<C>,
+    stream: Streaming<C>,
     mut read: impl FnMut(&mut C, ChunkPlace) -> Result<(), RequestError>,
 ) -> Result<Bytes, RequestError> {
-    let limit = app.limits.body;
-    let timer = BodyTimer::new(&app.limits);
+    let mut chunks = Chunks::new(app, stream);
     let mut scan = CountedBytes::new(&app.limits.memory)?;
-    let mut place = ChunkPlace::First;
-    while let Some(mut chunk) = timer
-        .next(stream.message())
-        .await?
-        .map_err(|status| stream_error(&status))?
-    {
+    while let Some((mut chunk, place)) = chunks.next().await? {
         read(&mut chunk, place)?;
-        let data = chunk.data();
-        if scan.len() + data.len() > limit {
-            return Err(RequestError::TooLarge { limit });
-        }
-        scan.extend(data)?;
-        place = ChunkPlace::Later;
+        scan.extend(chunk.data())?;
     }
     if scan.len() == 0 {
         return Err(RequestError::EmptyBody);

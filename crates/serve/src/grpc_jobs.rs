@@ -6,6 +6,7 @@ use std::{
     task::{Context, Poll, ready},
 };
 
+use bytes::Bytes;
 use darn_jobs::{Jobs, ListQuery, State};
 use tokio::{
     fs::File,
@@ -24,12 +25,13 @@ use super::{
     error::RequestError,
     generated::jobs_server::{self, JobsServer},
     grpc::request_id,
-    grpc_chunks::{CHUNK_BYTES, MAX_MESSAGE_BYTES, collect},
+    grpc_chunks::{CHUNK_BYTES, Chunks, MAX_MESSAGE_BYTES},
     job_events::{self, Listener},
     job_message::message,
     job_quota,
     job_request::{JobLabels, JobRequest, KeptConstraints},
     job_routes::{DEFAULT_LIMIT, KnownJob, MAX_LIMIT, page},
+    job_upload::{Pieces, store},
     key_file::Scope,
     parameters::Parameters,
     uploads::BodySize,
@@ -174,29 +176,49 @@ impl GrpcJobs {
         let jobs = self.jobs()?;
         job_quota::check(jobs, &caller).await?;
         let upload = app.upload_slot_for(BodySize::Large, app.client(&caller))?;
-        let (mut labels, mut constraints) = (JobLabels::default(), None);
-        let scan = collect(
+        let mut pieces = JobChunks {
+            chunks: Chunks::new(app, request.into_inner()),
             app,
-            request.into_inner(),
-            |chunk: &mut v1::JobChunk, place| {
-                if let Some(message) = chunk.labels.take() {
-                    place.check_first("labels")?;
-                    labels = JobLabels::of_message(message)?.checked(app, &caller)?;
-                }
-                if let Some(message) = chunk.constraints.take() {
-                    place.check_first("constraints")?;
-                    constraints = Some(KeptConstraints::from_message(&message)?);
-                }
-                Ok(())
-            },
-        )
-        .await?;
-        let asked = JobRequest::new(constraints, ScanForm::AsReceived);
-        let submission = labels.submission(upload.client(), &asked);
+            caller: &caller,
+            labels: JobLabels::default(),
+            constraints: None,
+        };
+        let input = store(jobs, &mut pieces).await?;
+        if input.bytes() == 0 {
+            return Err(RequestError::EmptyBody);
+        }
+        let asked = JobRequest::new(pieces.constraints, ScanForm::AsReceived);
+        let submission = pieces.labels.submission(upload.client(), &asked);
         let turn = job_quota::turn(jobs, &caller).await?;
-        let job = jobs.submit(submission, &scan[..]).await?.into_job();
+        let job = jobs.submit_received(submission, input).await?.into_job();
         drop(turn);
         Ok(message(jobs, &job).await?)
+    }
+}
+
+/// The chunks of a job that is handed over.
+struct JobChunks<'a> {
+    chunks: Chunks<v1::JobChunk>,
+    app: &'a App,
+    caller: &'a Caller,
+    labels: JobLabels,
+    constraints: Option<KeptConstraints>,
+}
+
+impl Pieces for &mut JobChunks<'_> {
+    async fn next(&mut self) -> Result<Option<Bytes>, RequestError> {
+        let Some((chunk, place)) = self.chunks.next().await? else {
+            return Ok(None);
+        };
+        if let Some(message) = chunk.labels {
+            place.check_first("labels")?;
+            self.labels = JobLabels::of_message(message)?.checked(self.app, self.caller)?;
+        }
+        if let Some(message) = chunk.constraints {
+            place.check_first("constraints")?;
+            self.constraints = Some(KeptConstraints::from_message(&message)?);
+        }
+        Ok(Some(chunk.data))
     }
 }
 

@@ -18,14 +18,15 @@ use uuid::Uuid;
 
 use super::{
     app::App,
-    body::{self, ScanRequest},
+    body,
     client::Caller,
     error::RequestError,
     job_answer,
     job_events::{self, Listener},
     job_message::{message, messages, problem_document},
     job_quota,
-    job_request::{JobLabels, JobRequest, KeptConstraints},
+    job_request::{JobLabels, JobRequest},
+    job_upload::{self, JobUpload},
     key_file::Scope,
     media_types::{JSON, PROBLEM_JSON},
     prefer::{PREFERENCE_APPLIED, Preferences},
@@ -187,18 +188,18 @@ async fn hand_over(
         body::discard(request, &app.limits);
         return Err(error);
     }
-    let ScanRequest {
-        scan,
+    let JobUpload {
+        input,
         files,
-        parameters,
-        upload,
-    } = body::receive_job_scan::<KeptConstraints>(app, request).await?;
-    let asked = JobRequest::new(parameters, files.answer(&headers).form);
-    let submission = labels.submission(upload.client(), &asked);
+        constraints,
+        permit,
+    } = job_upload::receive(app, jobs, request).await?;
+    let asked = JobRequest::new(constraints, files.answer(&headers).form);
+    let submission = labels.submission(permit.client(), &asked);
     let turn = job_quota::turn(jobs, &caller).await?;
-    let job = jobs.submit(submission, &scan[..]).await?.into_job();
+    let job = jobs.submit_received(submission, input).await?.into_job();
     drop(turn);
-    drop(upload);
+    drop(permit);
     Ok(job)
 }
 

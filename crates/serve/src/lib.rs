@@ -37,6 +37,7 @@ mod job_message;
 mod job_quota;
 mod job_request;
 mod job_routes;
+mod job_upload;
 mod job_worker;
 mod kept_session;
 mod key_file;
