@@ -43,6 +43,7 @@ pub fn run(args: &KeyArgs) -> Result<(), Failure> {
         sha256: EntryDigest(secret.digest()),
         scopes: new.scopes.clone(),
         limits: None,
+        webhook_secrets: Default::default(),
         expires: new.expires,
     };
     let entry = serde_json::to_string(&entry).or_fail("write the key's entry")?;

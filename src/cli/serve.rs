@@ -42,6 +42,7 @@ pub fn run(settings: &ServeCommand) -> Result<(), Failure> {
             error @ (ServeError::Exposed { .. }
             | ServeError::Keys(_)
             | ServeError::Tls(_)
+            | ServeError::Webhooks(_)
             | ServeError::AloneWithoutWorkers),
         ) => Err(Failure::Usage(error.to_string())),
         outcome => outcome.or_fail("serve"),

@@ -5,6 +5,7 @@ mod many;
 mod postgres;
 mod running;
 mod traces;
+mod webhooks;
 
 use running::Service;
 use std::process::Command;

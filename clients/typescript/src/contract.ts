@@ -14,6 +14,10 @@ export type Edit = Schemas['Edit'];
 export type HoleReport = Schemas['HoleReport'];
 export type HolesReport = Schemas['HolesReport'];
 export type Info = Schemas['Info'];
+export type Job = Schemas['Job'];
+export type JobList = Schemas['JobList'];
+export type JobState = Schemas['JobState'];
+export type JobWebhook = Schemas['JobWebhook'];
 export type Loop = Schemas['Loop'];
 export type Problem = Schemas['Problem'];
 export type ProblemCode = Schemas['ProblemCode'];
@@ -21,6 +25,7 @@ export type Report = Schemas['Report'];
 export type Session = Schemas['Session'];
 export type SessionHole = Schemas['SessionHole'];
 export type Skipped = Schemas['Skipped'];
+export type WebhookEvent = Schemas['WebhookEvent'];
 
 /** A point or a direction in the scene's space. */
 export type Vec3 = [number, number, number];

@@ -1,5 +1,5 @@
 /** Refusals of the service, and failures to reach it, as errors for a person. */
-import type { Problem } from './contract.js';
+import type { Problem, ProblemCode } from './contract.js';
 
 /** A problem document (RFC 9457) as an error. */
 export class ProblemError extends Error {
@@ -7,8 +7,11 @@ export class ProblemError extends Error {
 
   constructor(
     readonly status: number,
-    /** Stable word for programs, such as `queue_full`; empty when the answer was not the service's own. */
-    readonly code: string,
+    /**
+     * Stable word for programs, such as `queue_full`; empty when the answer was not the service's own. A later version of the service may have
+     * other words.
+     */
+    readonly code: ProblemCode | (string & {}),
     detail: string,
     /** Seconds after which another try may succeed. */
     readonly retryAfter: number | undefined,

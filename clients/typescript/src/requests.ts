@@ -28,20 +28,32 @@ export interface Upload {
   readonly body: FormData;
 }
 
-/** Sends a form by XMLHttpRequest, which unlike `fetch` tells how much was sent. Waits and tries again on 503. */
+/**
+ * Sends a form by XMLHttpRequest, which unlike `fetch` tells how much was sent; by `fetch` where there is none, as in Node. Waits and tries again on
+ * 503.
+ */
 export function upload(form: Upload, progress: Progress = {}): Promise<Answer> {
+  if (typeof XMLHttpRequest === 'undefined') {
+    return send(form.url, { method: 'POST', headers: form.headers, body: form.body }, progress);
+  }
   return patiently(progress, () => uploadOnce(form, progress));
 }
 
 /** Sends a request by `fetch`. Waits and tries again on 503. */
 export function send(url: URL, init: RequestInit, progress: Progress = {}): Promise<Answer> {
   return patiently(progress, async () => {
-    const response = await fetch(url, { ...init, signal: progress.signal ?? null });
-    if (!response.ok) {
-      throw problemOf(response.status, response.headers.get('retry-after'), await response.text());
-    }
+    const response = await opened(url, { ...init, signal: progress.signal ?? null });
     return { contentType: response.headers.get('content-type') ?? '', body: await response.arrayBuffer() };
   });
+}
+
+/** Sends a request by `fetch` once; the answer is read as it comes. */
+export async function opened(url: URL, init: RequestInit): Promise<Response> {
+  const response = await fetch(url, init);
+  if (!response.ok) {
+    throw problemOf(response.status, response.headers.get('retry-after'), await response.text());
+  }
+  return response;
 }
 
 /** The answer's body as JSON. */
@@ -64,13 +76,21 @@ async function patiently(progress: Progress, attempt: () => Promise<Answer>): Pr
   }
 }
 
-function pause(seconds: number, signal: AbortSignal | undefined): Promise<void> {
+/** Waits, unless that is stopped. */
+export function pause(seconds: number, signal: AbortSignal | undefined): Promise<void> {
   return new Promise((resolve, reject) => {
-    const timer = setTimeout(resolve, seconds * 1000);
-    signal?.addEventListener('abort', () => {
+    const stop = (): void => {
       clearTimeout(timer);
       reject(new DOMException('stopped', 'AbortError'));
-    });
+    };
+    const timer = setTimeout(() => {
+      signal?.removeEventListener('abort', stop);
+      resolve();
+    }, seconds * 1000);
+    if (signal?.aborted) {
+      stop();
+    }
+    signal?.addEventListener('abort', stop, { once: true });
   });
 }
 

@@ -1,8 +1,9 @@
 /** The service's requests that the editor makes, as functions of a typed client. */
 import type { AnchorFound, AnchorQuery, Constraints, HolesReport, Info, Report, Session } from './contract.js';
+import { Jobs } from './jobs.js';
 import { partsOf } from './multipart.js';
-import { ProblemError } from './problem.js';
-import { type Answer, type Progress, jsonOf, send, upload } from './requests.js';
+import { type Answer, type Progress, jsonOf } from './requests.js';
+import { type ServiceOptions, Transport, jsonBody } from './transport.js';
 
 /** Patches as positions: `x, y, z` of every patch vertex, hole after hole, in order of id. */
 export interface MendedPositions {
@@ -10,41 +11,31 @@ export interface MendedPositions {
   readonly report: Report;
 }
 
-/** What a service takes of its clients. */
-export interface ServiceOptions {
-  /** The key, where the service takes keys. */
-  readonly key?: string | undefined;
-  /**
-   * Asked for a key when the service refuses the one that was sent, or that none was sent; the request is sent again with the answer. Requests
-   * that are refused meanwhile wait for the same answer. `undefined`: there is none, and the request fails.
-   */
-  readonly askForKey?: (refusal: ProblemError) => Promise<string | undefined>;
-}
-
 /** A client of the service at one address. */
 export class Service {
-  private key: string | undefined;
-  /** The key that is being asked for. */
-  private asked: Promise<string | undefined> | undefined;
+  /** Scans that are mended later. */
+  readonly jobs: Jobs;
+  private readonly transport: Transport;
 
   /** @param base - The address below which the service's paths are. */
   constructor(
     readonly base: URL,
-    private readonly options: ServiceOptions = {},
+    options: ServiceOptions = {},
   ) {
-    this.key = options.key;
+    this.transport = new Transport(base, options);
+    this.jobs = new Jobs(this.transport);
   }
 
   /** Version and limits. */
   async info(): Promise<Info> {
-    return jsonOf(await this.send('info', {}));
+    return jsonOf(await this.transport.send('info', {}));
   }
 
   /** Every boundary loop of a scan. */
   async holes(scan: Blob, progress: Progress): Promise<HolesReport> {
     const form = new FormData();
     form.append('scan', scan, 'scan');
-    return jsonOf(await this.upload('holes', form, progress));
+    return jsonOf(await this.transport.upload('holes', form, progress));
   }
 
   /** Opens a session on some holes of a scan. */
@@ -52,7 +43,7 @@ export class Service {
     const form = new FormData();
     form.append('scan', scan, 'scan');
     form.append('constraints', new Blob([JSON.stringify(constraints)], { type: 'application/json' }), 'constraints');
-    return jsonOf(await this.upload('sessions', form, progress));
+    return jsonOf(await this.transport.upload('sessions', form, progress));
   }
 
   /** The patches' positions under constraints, without a report: the fastest answer. */
@@ -76,82 +67,25 @@ export class Service {
 
   /** Where on a hole's chart a point in space belongs. */
   async optimizeAnchor(session: string, query: AnchorQuery, progress: Progress): Promise<AnchorFound> {
-    return jsonOf(await this.send(`sessions/${session}/optimize-anchor`, jsonBody(query), progress));
+    return jsonOf(await this.transport.send(`sessions/${session}/optimize-anchor`, jsonBody(query), progress));
   }
 
   /** The whole scan, mended as the session was asked last. */
   async result(session: string, progress: Progress): Promise<Blob> {
-    const answer = await this.send(`sessions/${session}/result`, {}, progress);
+    const answer = await this.transport.send(`sessions/${session}/result`, {}, progress);
     return new Blob([answer.body], { type: answer.contentType });
   }
 
   /** Ends a session; nothing waits for it, and it may be gone already. */
   close(session: string): void {
-    const request = { method: 'DELETE', keepalive: true, headers: authorization(this.key) };
-    fetch(this.at(`sessions/${session}`), request).catch(() => undefined);
+    this.transport.forget(`sessions/${session}`, 'DELETE');
   }
 
   private inpaint(session: string, constraints: Constraints, accept: string, progress: Progress): Promise<Answer> {
     const request = jsonBody(constraints);
     request.headers = { ...request.headers, accept };
-    return this.send(`sessions/${session}/inpaint`, request, progress);
+    return this.transport.send(`sessions/${session}/inpaint`, request, progress);
   }
-
-  private send(path: string, request: Request, progress: Progress = {}): Promise<Answer> {
-    return this.withKey((key) => {
-      const headers = { ...request.headers, ...authorization(key) };
-      return send(this.at(path), { ...request, headers }, progress);
-    });
-  }
-
-  private upload(path: string, body: FormData, progress: Progress): Promise<Answer> {
-    return this.withKey((key) => upload({ url: this.at(path), headers: authorization(key), body }, progress));
-  }
-
-  /** Sends a request with the key, and again with another one as long as there is somebody who knows one. */
-  private async withKey(attempt: (key: string | undefined) => Promise<Answer>): Promise<Answer> {
-    for (;;) {
-      const sent = this.key;
-      try {
-        return await attempt(sent);
-      } catch (error) {
-        if (!(error instanceof ProblemError && error.keyIsRefused)) {
-          throw error;
-        }
-        // Another request may have been given a key since this one was sent.
-        if (this.key === sent) {
-          const given = await this.ask(error);
-          if (given === undefined) {
-            throw error;
-          }
-          this.key = given;
-        }
-      }
-    }
-  }
-
-  private ask(refusal: ProblemError): Promise<string | undefined> {
-    this.asked ??= Promise.resolve(this.options.askForKey?.(refusal)).finally(() => (this.asked = undefined));
-    return this.asked;
-  }
-
-  private at(path: string): URL {
-    return new URL(path, this.base);
-  }
-}
-
-/** A request by `fetch` whose headers can be added to. */
-interface Request extends RequestInit {
-  headers?: Record<string, string>;
-}
-
-/** The header of a key; nothing without one. It never goes into an address, which logs and histories keep. */
-function authorization(key: string | undefined): Record<string, string> {
-  return key === undefined ? {} : { authorization: `Bearer ${key}` };
-}
-
-function jsonBody(message: unknown): Request {
-  return { method: 'POST', headers: { 'content-type': 'application/json' }, body: JSON.stringify(message) };
 }
 
 function reportAndPatches(answer: Answer): { report: Report; patches: Uint8Array<ArrayBuffer> } {

@@ -141,6 +141,8 @@ codes! {
     JOB_EXPIRED = "job_expired", 410, NotFound;
     /// The idempotency key was used with another payload.
     IDEMPOTENCY_MISMATCH = "idempotency_mismatch", 422, InvalidArgument;
+    /// The job names a webhook, and the service has no secret to sign webhooks with.
+    WEBHOOKS_OFF = "webhooks_off", 422, FailedPrecondition;
     /// Every attempt at the job ended its process.
     JOB_CRASHED_WORKER = "job_crashed_worker", 500, Internal;
     /// The disk on which jobs are kept is full.

@@ -113,6 +113,11 @@ impl Blobs {
         }
     }
 
+    /// Like [`Self::delete`], for where nothing can be awaited.
+    pub(crate) fn delete_now(&self, name: &BlobName) -> io::Result<()> {
+        remove_if_there(&self.path(name))
+    }
+
     /// The whole files that are at least this old, for the caller to compare with the rows. Deletes what is left of writing that broke off
     /// at least as long ago.
     ///

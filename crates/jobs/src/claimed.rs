@@ -173,7 +173,10 @@ impl ClaimedJob {
         if matches!(ended, Ok(_) | Err(JobError::LeaseLost(_))) {
             self.phase = Phase::Ended;
             self.keeper.abort();
-            self.jobs.announce(self.job.id);
+            match &ended {
+                Ok(job) => self.jobs.announce_end(job),
+                Err(_) => self.jobs.announce(self.job.id),
+            }
         }
         ended
     }

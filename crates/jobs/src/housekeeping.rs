@@ -63,7 +63,7 @@ impl Jobs {
         let jobs = self.store().expire_leases(ExpiredLeases::ByTime).await?;
         for job in &jobs {
             warn!(job = %job.id, attempt = job.attempt, worker = job.worker, state = %job.state, "a worker did not renew its lease");
-            self.announce(job.id);
+            self.announce_end(job);
             self.wake();
         }
         Ok(jobs.len())

@@ -25,6 +25,7 @@ use super::{
     claimed::ClaimedJob,
     company::RunningJobs,
     error::JobError,
+    input::ReceivedInput,
     job::{
         Claimant, ClientCounts, Job, ListQuery, NewJob, Page, Retention, RunningLimits, State,
         Submission, Submitted,
@@ -88,6 +89,8 @@ pub struct Jobs {
     /// One claim at a time, so that it knows in what company its job starts.
     claims: Mutex<()>,
     waiting: Notify,
+    /// An end waits that a webhook is to be told of.
+    ended: Notify,
     changed: broadcast::Sender<Uuid>,
     /// Jobs whose workers should look whether to stop.
     stopped: broadcast::Sender<Uuid>,
@@ -127,12 +130,14 @@ impl Jobs {
             running: Arc::default(),
             claims: Mutex::default(),
             waiting: Notify::new(),
+            ended: Notify::new(),
             changed: broadcast::channel(CHANGES_KEPT).0,
             stopped: broadcast::channel(CHANGES_KEPT).0,
             _lock: lock,
         });
         if is_ours_alone {
             jobs.store.expire_leases(ExpiredLeases::OfTheDead).await?;
+            jobs.store.release_deliveries().await?;
             // It frees space, and is worth no failure to start.
             if let Err(error) = jobs.sweep(Duration::ZERO).await {
                 warn!(?error, "files without a job cannot be looked for");
@@ -153,17 +158,29 @@ impl Jobs {
         submission: Submission,
         input: impl AsyncRead,
     ) -> Result<Submitted, JobError> {
-        self.store.check_room().await?;
-        let id = Uuid::new_v4();
-        let name = BlobName::input(id);
-        let written = self.blobs.put(&name, input).await?;
+        let received = self.receive(input).await?;
+        self.submit_received(submission, received).await
+    }
+
+    /// [`Self::submit`] of an input that has been stored before.
+    ///
+    /// # Errors
+    /// [`JobError::IdempotencyMismatch`], [`JobError::StorageFull`]. Nothing is left then.
+    pub async fn submit_received(
+        &self,
+        submission: Submission,
+        input: ReceivedInput,
+    ) -> Result<Submitted, JobError> {
         let new = NewJob {
-            id,
-            digest: digest(&submission, &written.sha256),
+            id: input.id,
+            digest: digest(&submission, &input.written.sha256),
             submission,
-            input: name.clone(),
-            bytes: i64::try_from(written.bytes).unwrap_or(i64::MAX),
+            input: input.name.clone(),
+            bytes: i64::try_from(input.written.bytes).unwrap_or(i64::MAX),
         };
+        let name = input.name.clone();
+        // From here on a row may name it, also where this future is dropped.
+        input.keep();
         let created = self.store.create(&new).await;
         match &created {
             Ok(Submitted::New(_)) => self.wake(),
@@ -261,7 +278,7 @@ impl Jobs {
     /// Cancels a job; see [`Store::cancel`].
     pub async fn cancel(&self, id: Uuid) -> Result<Job, JobError> {
         let job = self.store.cancel(id).await?;
-        self.announce(id);
+        self.announce_end(&job);
         self.announce_stop(id);
         Ok(job)
     }
@@ -353,6 +370,14 @@ impl Jobs {
         }
     }
 
+    /// Waits until a delivery may be due that [`Store::claim_delivery`] has not seen: until this process ends a job with a webhook, at most a second.
+    pub async fn look_for_deliveries(&self) {
+        tokio::select! {
+            () = self.ended.notified() => {}
+            () = sleep(self.settings.poll) => {}
+        }
+    }
+
     /// Closes the connections to the database. Workers have ended, or given back, their jobs before.
     pub async fn close(&self) {
         self.store.close().await;
@@ -390,6 +415,14 @@ impl Jobs {
     pub(crate) fn announce(&self, job: Uuid) {
         // Nobody may be listening.
         let _ = self.changed.send(job);
+    }
+
+    /// Tells this process that a job has changed, and whoever delivers if it has ended and a webhook is to be told.
+    pub(crate) fn announce_end(&self, job: &Job) {
+        self.announce(job.id);
+        if job.webhook.is_some() && job.state.is_finished() {
+            self.ended.notify_one();
+        }
     }
 
     fn announce_stop(&self, job: Uuid) {

@@ -23,6 +23,9 @@
 //!   After the first crash it runs alone in its process, so that a job that takes its process down is not the end of others.
 //! - Finished jobs keep their files, and then their rows, as long as [`Retention`] says.
 //!
+//! Where a job names a webhook, the end of the job and a row of an outbox are written together. Whoever delivers claims such a row
+//! ([`Store::claim_delivery`]), tells the webhook, and writes what came of it ([`Store::end_delivery`]); this crate sends nothing.
+//!
 //! # A worker
 //!
 //! ```
@@ -88,9 +91,11 @@ mod attempt;
 pub mod blobs;
 mod claimed;
 mod company;
+mod delivery;
 mod engine;
 mod error;
 mod housekeeping;
+mod input;
 mod job;
 mod jobs;
 mod reserve;
@@ -98,7 +103,9 @@ mod store;
 
 pub use attempt::{Attempt, StopReason};
 pub use claimed::ClaimedJob;
+pub use delivery::{ClaimedDelivery, Delivery, DeliveryOutcome, TryOutcome};
 pub use error::JobError;
+pub use input::ReceivedInput;
 pub use job::*;
 pub use jobs::{Jobs, Place, Settings};
 pub use store::{Clock, ExpiredLeases, Freed, Store};

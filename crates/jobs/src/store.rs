@@ -6,6 +6,7 @@
 
 mod attempts;
 mod instances;
+mod outbox;
 mod requests;
 mod retention;
 

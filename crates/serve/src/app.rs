@@ -10,9 +10,8 @@ use std::{
 
 use axum::extract::Request;
 use darn_jobs::{Jobs, Place};
-use tokio::time::{Instant, timeout_at};
+use tokio::time::timeout_at;
 use tokio_util::sync::CancellationToken;
-use tracing::error;
 use uuid::Uuid;
 
 use super::{
@@ -24,17 +23,17 @@ use super::{
     instance::{Instance, InstanceName, SessionPlace},
     kept_session::KeptSession,
     keys::KeyRing,
-    pace::PaceLimits,
     pool::{JobTurn, Pool},
     pool_task::{PoolError, TaskOrder},
+    request_limits::{Deadline, DurableSize, RequestLimits, TaskSize, of_pool, result_of},
     result_cache::ResultCache,
     session_store::{SessionError, SessionLimits, SessionStore},
     telemetry::Metrics,
     tls::ServedCertificate,
     uploads::{BodySize, UploadRefusal, UploadSlot, Uploads},
+    webhook::Webhooks,
 };
-use darn_budget::{Budget, Limits, Listener, MemoryPool};
-use darn_contract::codes;
+use darn_budget::{Budget, Limits, MemoryPool};
 use darn_contract::port::{Mender, Refusal};
 
 /// Work that a request may cost for each byte of its scan, in nanoseconds of one core. Mends of real scans take up to 1,500.
@@ -66,6 +65,8 @@ pub struct App {
     pub jobs: Option<Arc<Jobs>>,
     /// Mends of requests that may come again; `None` where none are kept.
     pub results: Option<ResultCache>,
+    /// What tells clients of their jobs' ends; there whenever the jobs are.
+    pub webhooks: Option<Arc<Webhooks>>,
     /// The keys; `None` where anybody may call.
     pub keys: Option<Arc<KeyRing>>,
     /// The certificate of TLS; `None` for plain connections.
@@ -117,66 +118,6 @@ impl UploadPermit {
     }
 }
 
-/// The size of a request, by which its cost is estimated and limited.
-#[derive(Debug)]
-struct TaskSize {
-    /// Whom it is for.
-    client: Client,
-    /// Bytes of its scan.
-    bytes: usize,
-}
-
-/// The size of a durable job, and who is told how far it is.
-#[derive(Debug)]
-pub struct DurableSize {
-    /// Bytes of its scan.
-    pub bytes: usize,
-    /// Who is told.
-    pub listener: Listener,
-}
-
-/// When a request's result comes too late.
-#[derive(Debug, Clone, Copy)]
-struct Deadline {
-    at: Instant,
-    /// The whole time allowed, for the error's text.
-    length: Duration,
-}
-
-impl Deadline {
-    fn after(length: Duration) -> Self {
-        let at = Instant::now() + length;
-        Self { at, length }
-    }
-}
-
-/// Limits of a request.
-#[derive(Debug, Clone)]
-pub struct RequestLimits {
-    /// Longest time for waiting and mending together.
-    pub deadline: Duration,
-    /// Most bytes of a body.
-    pub body: usize,
-    /// The memory that bodies, jobs and answers share.
-    pub memory: Arc<MemoryPool>,
-    /// Work that a request may cost whatever its size, as CPU time.
-    pub work: Duration,
-    /// Longest time between two pieces of a body.
-    pub body_pause: Duration,
-    /// Fewest bytes per second of a body; 0 for no such limit.
-    pub body_rate: usize,
-}
-
-impl RequestLimits {
-    /// How slowly a body may move.
-    pub fn pace(&self) -> PaceLimits {
-        PaceLimits {
-            pause: self.body_pause,
-            rate: self.body_rate,
-        }
-    }
-}
-
 impl std::fmt::Debug for App {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("App")
@@ -201,6 +142,10 @@ impl App {
                 let (Place::Folder(folder) | Place::Shared { folder, .. }) = place;
                 Some(opened.map_err(|source| ServeError::Jobs { folder, source })?)
             }
+            None => None,
+        };
+        let webhooks = match &jobs {
+            Some(_) => Some(Arc::new(Webhooks::new(&settings.webhooks)?)),
             None => None,
         };
         let keys = match &settings.keys {
@@ -244,6 +189,7 @@ impl App {
             sessions,
             jobs,
             results: settings.result_cache.map(ResultCache::new),
+            webhooks,
             keys,
             certificate,
             instance: Instance::new(settings.instance.unwrap_or_else(InstanceName::random)),
@@ -318,7 +264,10 @@ impl App {
     }
 
     /// Takes an upload permit whatever waits in the queue.
-    fn upload_slot_for(
+    ///
+    /// # Errors
+    /// `UploadsFull`, `UploadShareFull` or `Draining`.
+    pub(crate) fn upload_slot_for(
         &self,
         size: BodySize,
         client: Client,
@@ -513,46 +462,5 @@ impl App {
         self.draining.store(true, Relaxed);
         self.stopping.cancel();
         self.pool.close();
-    }
-}
-
-/// The result of a task, or the error that its caller receives.
-fn result_of<T>(
-    outcome: Result<Result<T, Refusal>, PoolError>,
-    deadline: Deadline,
-) -> Result<T, RequestError> {
-    match outcome {
-        Ok(Ok(value)) => Ok(value),
-        Ok(Err(refusal)) if refusal.is_internal() => {
-            let code = refusal.code.word;
-            error!(code, detail = refusal.detail, "mending failed");
-            Err(RequestError::Internal)
-        }
-        // The next step would have ended after the deadline, so it was not begun.
-        Ok(Err(refusal)) if refusal.code == codes::DEADLINE_EXCEEDED => {
-            Err(of_pool(PoolError::Expired, deadline.length))
-        }
-        Ok(Err(refusal)) => Err(RequestError::Refused(refusal)),
-        Err(error) => Err(of_pool(error, deadline.length)),
-    }
-}
-
-/// The error that a caller receives when the pool gave no result; `deadline` is the time that was allowed.
-fn of_pool(error: PoolError, deadline: Duration) -> RequestError {
-    match error {
-        PoolError::Full {
-            waiting,
-            running,
-            retry_after,
-        } => RequestError::QueueFull {
-            waiting,
-            running,
-            retry_after,
-        },
-        PoolError::Closed => RequestError::Draining,
-        PoolError::Expired => RequestError::Deadline {
-            seconds: deadline.as_secs_f64(),
-        },
-        PoolError::Panicked => RequestError::Internal,
     }
 }

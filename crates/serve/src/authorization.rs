@@ -50,8 +50,8 @@ impl Access {
             "/livez" | "/readyz" | "/openapi.json" => Self::Open,
             "/metrics" => Self::Scope(Scope::Metrics),
             "/inpaint" | "/holes" | "/optimize-anchor" | "/strip" => Self::Scope(Scope::Mend),
+            _ if is_below(route, "/darn.v1.Jobs") || is_below(route, "/jobs") => Self::Jobs,
             _ if is_below(route, "/sessions") || is_grpc(route) => Self::Scope(Scope::Mend),
-            _ if is_below(route, "/jobs") => Self::Jobs,
             _ if editor::has_file(route) => Self::Open,
             _ => Self::AnyKey,
         }
@@ -168,6 +168,7 @@ mod tests {
             ("/sessions/{id}/result", Access::Scope(Scope::Mend)),
             ("/sessionsX", Access::AnyKey),
             ("/darn.v1.Darn/{method}", Access::Scope(Scope::Mend)),
+            ("/darn.v1.Jobs/{method}", Access::Jobs),
             ("/jobs", Access::Jobs),
             ("/jobs/{id}/events", Access::Jobs),
             ("/anything", Access::AnyKey),

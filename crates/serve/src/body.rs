@@ -4,14 +4,17 @@ use std::{collections::BTreeMap, error::Error, future::poll_fn, pin::Pin};
 
 use axum::{
     body::{Body, HttpBody},
-    extract::{DefaultBodyLimit, FromRequest, Multipart, Request, multipart::MultipartError},
+    extract::{
+        DefaultBodyLimit, FromRequest, Multipart, Request,
+        multipart::{Field, MultipartError},
+    },
     http::{HeaderMap, header, request::Parts},
 };
 use bytes::Bytes;
 use tokio::time::{Duration, Instant, timeout, timeout_at};
 
 use super::{
-    app::{App, RequestLimits, UploadPermit},
+    app::{App, UploadPermit},
     content_coding::ContentCoding,
     counted::{CountedBytes, counted, take},
     digest::ExpectedDigests,
@@ -19,6 +22,7 @@ use super::{
     media_types::{FORM_DATA, FORM_URLENCODED, GLB, GLTF, JSON, OBJ, OCTET_STREAM, PLY, ZIP},
     pace::{PaceLimits, TooSlow},
     parameters::{self, Parameters},
+    request_limits::RequestLimits,
     scan_files::{self, ScanFiles, looks_like_a_scan},
 };
 use darn_contract::{Constraints, FieldError, cut};
@@ -96,7 +100,7 @@ impl BodyTimer {
     }
 
     /// The error of a body that broke off: its connection notices first when it comes below the rate.
-    fn broken_off(&self, error: &axum::Error) -> RequestError {
+    pub fn broken_off(&self, error: &axum::Error) -> RequestError {
         let mut cause: Option<&(dyn Error + 'static)> = Some(error);
         while let Some(error) = cause {
             if error.is::<TooSlow>() {
@@ -110,13 +114,28 @@ impl BodyTimer {
 
 /// How a body carries a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum ScanBody {
+pub enum ScanBody {
     /// The body is the scan.
     Bare,
     /// The body is the scan if its first bytes say so: no media type says what it is.
     Untold,
     /// The scan is a part of multipart/form-data.
     Form,
+}
+
+impl ScanBody {
+    /// Checks the first bytes of a body that is the scan.
+    ///
+    /// # Errors
+    /// `UnsupportedMediaType` for one whose type nobody told, and that does not look like a scan.
+    pub fn check_head(self, headers: &HeaderMap, head: &[u8]) -> Result<(), RequestError> {
+        match self {
+            Self::Untold if !head.is_empty() && !looks_like_a_scan(head) => {
+                Err(unsupported(headers, SCAN_BODY_MEDIA_TYPES))
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 /// Receives a request with a scan, unless the service is full or shuts down.
@@ -171,17 +190,15 @@ async fn read_scan<P: Parameters>(
     };
     let (kind, bytes) = read_body(&parts, body, limits, check_headers).await?;
     let (scan, files, parameters) = match kind {
-        ScanBody::Untold if !bytes.is_empty() && !looks_like_a_scan(&bytes) => {
-            return Err(unsupported(&parts.headers, SCAN_BODY_MEDIA_TYPES));
-        }
         ScanBody::Bare | ScanBody::Untold => {
+            kind.check_head(&parts.headers, &bytes)?;
             let files = ScanFiles::of(&bytes);
             (bytes, files, None)
         }
         ScanBody::Form => {
             // Splitting copies the parts.
             let memory = take(&limits.memory, bytes.len())?;
-            let form = split_form(parts, bytes).await?;
+            let form = split_form(&parts, bytes).await?;
             if form.files.is_empty() {
                 let files = ScanFiles::of(&form.scan);
                 (counted(form.scan, memory), files, form.parameters)
@@ -276,7 +293,8 @@ pub fn discard(request: Request, limits: &RequestLimits) {
     discard_body(&parts.headers, body, limits);
 }
 
-fn discard_body(headers: &HeaderMap, mut body: Body, limits: &RequestLimits) {
+/// [`discard`], for a request that has been taken apart.
+pub fn discard_body(headers: &HeaderMap, mut body: Body, limits: &RequestLimits) {
     if headers.contains_key(header::EXPECT) {
         return;
     }
@@ -293,7 +311,11 @@ fn discard_body(headers: &HeaderMap, mut body: Body, limits: &RequestLimits) {
     tokio::spawn(timeout(DRAIN_TIME, drained));
 }
 
-fn scan_body(headers: &HeaderMap) -> Result<ScanBody, RequestError> {
+/// How a body carries a scan, by its media type.
+///
+/// # Errors
+/// `UnsupportedMediaType`.
+pub fn scan_body(headers: &HeaderMap) -> Result<ScanBody, RequestError> {
     match essence(content_type(headers)).as_str() {
         GLB | GLTF | OBJ | PLY | ZIP => Ok(ScanBody::Bare),
         "" | OCTET_STREAM | FORM_URLENCODED => Ok(ScanBody::Untold),
@@ -323,7 +345,10 @@ fn unsupported(headers: &HeaderMap, send: &'static str) -> RequestError {
 }
 
 /// Refuses a body that its `content-length` declares too large.
-fn check_length(headers: &HeaderMap, limit: usize) -> Result<(), RequestError> {
+///
+/// # Errors
+/// `TooLarge`.
+pub fn check_length(headers: &HeaderMap, limit: usize) -> Result<(), RequestError> {
     let length = (headers.get(header::CONTENT_LENGTH))
         .and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
     match length {
@@ -345,7 +370,8 @@ async fn read_bytes(body: &mut Body, limits: &RequestLimits) -> Result<Bytes, Re
     Ok(bytes.freeze())
 }
 
-async fn next_piece(body: &mut Body) -> Option<Result<Bytes, axum::Error>> {
+/// The next bytes of a body; `None` at its end.
+pub async fn next_piece(body: &mut Body) -> Option<Result<Bytes, axum::Error>> {
     loop {
         match poll_fn(|cx| Pin::new(&mut *body).poll_frame(cx)).await? {
             Ok(frame) => {
@@ -366,49 +392,71 @@ struct FormParts<P> {
     parameters: Option<P>,
 }
 
+/// The error of a form that cannot be read.
+pub fn malformed_form(error: &MultipartError) -> RequestError {
+    RequestError::Malformed(format!("the multipart body: {}", error.body_text()))
+}
+
+/// The parts of a body of multipart/form-data, as they come.
+///
+/// # Errors
+/// `Malformed` without a boundary.
+pub async fn form_of(parts: &Parts, body: Body) -> Result<Multipart, RequestError> {
+    let mut request = Request::new(body);
+    *request.headers_mut() = parts.headers.clone();
+    // axum's own limit is 2 MB; the service's limit is applied while the bytes come.
+    DefaultBodyLimit::disable().apply(&mut request);
+    (Multipart::from_request(request, &()).await).map_err(|rejection| {
+        RequestError::Malformed(format!("the multipart body: {}", rejection.body_text()))
+    })
+}
+
+/// The name of a part, which may be there and has a media type that is read.
+///
+/// # Errors
+/// `Malformed` or `UnsupportedMediaType`.
+pub fn check_part<P: Parameters>(field: &Field<'_>) -> Result<String, RequestError> {
+    let name = field.name().unwrap_or_default().to_owned();
+    let media_type = field.content_type().map(essence);
+    let (expected, read): (_, &[&str]) = match name.as_str() {
+        "scan" => (SCAN_PART_MEDIA_TYPES, &SCAN_PART_READ),
+        part if part == P::PART => (JSON, &parameters::MEDIA_TYPES),
+        // A file that the scan refers to; the scan knows its type.
+        part if part.contains('.') => ("", &[]),
+        _ => {
+            return Err(RequestError::Malformed(format!(
+                "there is no part `{}`; the parts are `scan`, `{}`, and files of the scan, each named by its URI there",
+                cut(&name, 100),
+                P::PART
+            )));
+        }
+    };
+    let unread = |it: &String| !read.is_empty() && !read.contains(&it.as_str());
+    match media_type.filter(unread) {
+        Some(media_type) => Err(RequestError::UnsupportedMediaType {
+            got: format!("`{}` of part `{name}`", cut(&media_type, 100)),
+            send: expected,
+        }),
+        None => Ok(name),
+    }
+}
+
+/// The error of a part that comes twice.
+pub fn part_twice(name: &str) -> RequestError {
+    RequestError::Malformed(format!("the part `{}` comes twice", cut(name, 100)))
+}
+
 async fn split_form<P: Parameters>(
-    parts: Parts,
+    parts: &Parts,
     bytes: Bytes,
 ) -> Result<FormParts<P>, RequestError> {
-    let malformed = |error: MultipartError| {
-        RequestError::Malformed(format!("the multipart body: {}", error.body_text()))
-    };
-    let mut request = Request::from_parts(parts, Body::from(bytes));
-    // axum's own limit is 2 MB; the service's limit was applied while the bytes came.
-    DefaultBodyLimit::disable().apply(&mut request);
-    let mut form = (Multipart::from_request(request, &()).await).map_err(|rejection| {
-        RequestError::Malformed(format!("the multipart body: {}", rejection.body_text()))
-    })?;
+    let mut form = form_of(parts, Body::from(bytes)).await?;
     let mut named: BTreeMap<String, Bytes> = BTreeMap::new();
-    while let Some(field) = form.next_field().await.map_err(malformed)? {
-        let name = field.name().unwrap_or_default().to_owned();
-        let media_type = field.content_type().map(essence);
-        let (expected, read): (_, &[&str]) = match name.as_str() {
-            "scan" => (SCAN_PART_MEDIA_TYPES, &SCAN_PART_READ),
-            part if part == P::PART => (JSON, &parameters::MEDIA_TYPES),
-            // A file that the scan refers to; the scan knows its type.
-            part if part.contains('.') => ("", &[]),
-            _ => {
-                return Err(RequestError::Malformed(format!(
-                    "there is no part `{}`; the parts are `scan`, `{}`, and files of the scan, each named by its URI there",
-                    cut(&name, 100),
-                    P::PART
-                )));
-            }
-        };
-        let unread = |it: &String| !read.is_empty() && !read.contains(&it.as_str());
-        if let Some(media_type) = media_type.filter(unread) {
-            return Err(RequestError::UnsupportedMediaType {
-                got: format!("`{}` of part `{name}`", cut(&media_type, 100)),
-                send: expected,
-            });
-        }
-        let bytes = field.bytes().await.map_err(malformed)?;
+    while let Some(field) = form.next_field().await.map_err(|it| malformed_form(&it))? {
+        let name = check_part::<P>(&field)?;
+        let bytes = field.bytes().await.map_err(|it| malformed_form(&it))?;
         if named.insert(name.clone(), bytes).is_some() {
-            return Err(RequestError::Malformed(format!(
-                "the part `{}` comes twice",
-                cut(&name, 100)
-            )));
+            return Err(part_twice(&name));
         }
     }
     let parameters = named.remove(P::PART);

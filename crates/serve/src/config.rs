@@ -6,7 +6,7 @@ use clap::Args;
 
 use darn_jobs::Place;
 
-use super::{instance::InstanceName, telemetry::LogFormat, tls::TlsFiles};
+use super::{instance::InstanceName, telemetry::LogFormat, tls::TlsFiles, webhook::WebhookArgs};
 
 /// Upper bound of the settings `queue` and `uploads`.
 const MAX_WAITING: usize = 65_536;
@@ -76,6 +76,10 @@ pub struct ServeArgs {
     /// a random one
     #[arg(long, env = "DARN_INSTANCE", value_name = "NAME")]
     pub instance: Option<InstanceName>,
+
+    /// Webhooks of jobs.
+    #[command(flatten)]
+    pub webhooks: WebhookArgs,
 
     /// Scans mended at once, at most 1024; left out, two per processor. With 0 the process takes jobs for others to run, and needs a database
     #[arg(long, env = "DARN_WORKERS", value_name = "N", value_parser = workers)]

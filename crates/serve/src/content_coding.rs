@@ -7,7 +7,7 @@ use bytes::Bytes;
 use flate2::bufread::{DeflateDecoder, MultiGzDecoder, ZlibDecoder};
 use tokio::task;
 
-use super::{app::RequestLimits, counted::CountedBytes, error::RequestError};
+use super::{counted::CountedBytes, error::RequestError, request_limits::RequestLimits};
 use darn_contract::cut;
 
 /// Bytes decompressed at a time.

@@ -96,6 +96,16 @@ impl ExpectedDigests {
         Ok(Self(all))
     }
 
+    /// Checks a body that comes in pieces.
+    pub fn begin(self) -> RunningDigests {
+        let has = |wanted| self.0.iter().any(|(_, algorithm, _)| *algorithm == wanted);
+        RunningDigests {
+            sha256: has(Algorithm::Sha256).then(Sha256::new),
+            sha512: has(Algorithm::Sha512).then(Sha512::new),
+            expected: self,
+        }
+    }
+
     /// Checks a body.
     ///
     /// # Errors
@@ -110,8 +120,44 @@ impl ExpectedDigests {
     }
 
     fn check_now(self, body: &[u8]) -> Result<(), RequestError> {
-        for (header, algorithm, expected) in self.0 {
-            let found = algorithm.of(body);
+        let mut running = self.begin();
+        running.update(body);
+        running.check()
+    }
+}
+
+/// The digests of a body of which some pieces have come.
+#[derive(Debug)]
+pub struct RunningDigests {
+    sha256: Option<Sha256>,
+    sha512: Option<Sha512>,
+    expected: ExpectedDigests,
+}
+
+impl RunningDigests {
+    /// Takes the next piece.
+    pub fn update(&mut self, piece: &[u8]) {
+        if let Some(sha256) = &mut self.sha256 {
+            sha256.update(piece);
+        }
+        if let Some(sha512) = &mut self.sha512 {
+            sha512.update(piece);
+        }
+    }
+
+    /// Checks the whole body; there is nothing to check then.
+    ///
+    /// # Errors
+    /// `DigestMismatch`.
+    pub fn check(&mut self) -> Result<(), RequestError> {
+        let sha256 = self.sha256.take().map(|it| it.finalize().to_vec());
+        let sha512 = self.sha512.take().map(|it| it.finalize().to_vec());
+        for (header, algorithm, expected) in std::mem::take(&mut self.expected.0) {
+            let found = match algorithm {
+                Algorithm::Sha256 => &sha256,
+                Algorithm::Sha512 => &sha512,
+            };
+            let found = found.clone().unwrap_or_default();
             if found != expected {
                 return Err(RequestError::DigestMismatch {
                     header,

@@ -165,6 +165,11 @@ pub enum RequestError {
         /// The job of the first payload.
         job: Uuid,
     },
+    /// A webhook is named, and nothing can sign it.
+    #[error(
+        "this service tells no webhooks: it has no secret to sign them with (DARN_WEBHOOK_SECRET, or `webhookSecrets` of a key)"
+    )]
+    WebhooksOff,
     /// The disk is full.
     #[error("the disk on which this service keeps jobs is full (DARN_DATA)")]
     StorageFull,
@@ -305,6 +310,7 @@ impl RequestError {
             Self::JobWrongState { .. } => codes::JOB_WRONG_STATE,
             Self::JobExpired => codes::JOB_EXPIRED,
             Self::IdempotencyMismatch { .. } => codes::IDEMPOTENCY_MISMATCH,
+            Self::WebhooksOff => codes::WEBHOOKS_OFF,
             Self::StorageFull => codes::STORAGE_FULL,
             Self::QueueFull { .. } => codes::QUEUE_FULL,
             Self::UploadsFull { .. } | Self::UploadShareFull { .. } => codes::UPLOADS_FULL,

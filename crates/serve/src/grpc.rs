@@ -1,21 +1,16 @@
 //! The gRPC service: the same jobs, limits and errors as over HTTP.
 
-use std::{
-    pin::Pin,
-    sync::Arc,
-    task::{Context, Poll},
-};
+use std::sync::Arc;
 
-use bytes::Bytes;
-use tonic::{Code, Request, Response, Status, Streaming, codegen::tokio_stream::Stream};
+use tonic::{Request, Response, Status, Streaming};
 
 use super::generated::darn_server::{Darn, DarnServer};
 use super::{
     app::App,
-    body::{BodyTimer, ScanRequest},
+    body::ScanRequest,
     client::Caller,
-    counted::CountedBytes,
     error::RequestError,
+    grpc_chunks::{ChunkStream, MAX_MESSAGE_BYTES, collect},
     parameters::Parameters,
     scan_files::ScanFiles,
     telemetry::RequestId,
@@ -23,17 +18,9 @@ use super::{
 };
 use darn_contract::port::{HolesQuery, Mended, ScanForm, Stripped};
 use darn_contract::{
-    Constraints, Search, excerpt,
-    v1::{
-        self, AnchorFound, HolesReport, InpaintChunk, ScanChunk, StripChunk, inpaint_chunk::Part,
-        strip_chunk,
-    },
+    Constraints, Search,
+    v1::{self, AnchorFound, HolesReport, InpaintChunk, ScanChunk, StripChunk},
 };
-
-/// Bytes of a scan per message of an answer.
-const CHUNK_BYTES: usize = 256 << 10;
-/// Most bytes of an incoming message. Decoded, its nested messages take up to 36 times as much memory: about the default body limit.
-const MAX_MESSAGE_BYTES: usize = 4 << 20;
 
 /// The service, ready to be routed. tonic encodes each answer on an async thread; protobuf takes a fraction of JSON's time for it.
 pub fn service(app: &Arc<App>) -> DarnServer<GrpcService> {
@@ -167,24 +154,12 @@ impl GrpcService {
         request: Request<Streaming<ScanChunk>>,
     ) -> Result<ScanRequest<P>, RequestError> {
         let client = self.0.client(&Caller::of(request.extensions()));
-        let mut stream = request.into_inner();
+        let stream = request.into_inner();
         let upload = self.0.upload_permit_for(BodySize::Large, client)?;
-        let limit = self.0.limits.body;
-        let timer = BodyTimer::new(&self.0.limits);
         let mut parameters = None;
-        let mut scan = CountedBytes::new(&self.0.limits.memory)?;
-        let mut first = true;
-        while let Some(mut chunk) = timer
-            .next(stream.message())
-            .await?
-            .map_err(|status| stream_error(&status))?
-        {
-            if let Some(message) = P::take(&mut chunk) {
-                if !first {
-                    let part = P::PART;
-                    let detail = format!("only the first chunk carries `{part}`");
-                    return Err(RequestError::Malformed(detail));
-                }
+        let scan = collect(&self.0, stream, |chunk: &mut ScanChunk, place| {
+            if let Some(message) = P::take(chunk) {
+                place.check_first(P::PART)?;
                 parameters = Some(P::from_message(&message)?);
             }
             if chunk.constraints.is_some() || chunk.query.is_some() || chunk.holes.is_some() {
@@ -193,16 +168,9 @@ impl GrpcService {
                         .to_owned(),
                 ));
             }
-            if scan.len() + chunk.data.len() > limit {
-                return Err(RequestError::TooLarge { limit });
-            }
-            scan.extend(&chunk.data)?;
-            first = false;
-        }
-        if scan.len() == 0 {
-            return Err(RequestError::EmptyBody);
-        }
-        let scan = scan.freeze();
+            Ok(())
+        })
+        .await?;
         Ok(ScanRequest {
             files: ScanFiles::of(&scan),
             scan,
@@ -236,73 +204,11 @@ impl ChunkParameters for HolesQuery {
     }
 }
 
-fn stream_error(status: &Status) -> RequestError {
-    match status.code() {
-        // tonic's code for a message above its limit.
-        Code::OutOfRange => RequestError::MessageTooLarge {
-            limit: MAX_MESSAGE_BYTES,
-        },
-        _ => RequestError::Malformed(format!(
-            "the stream broke off: {}",
-            excerpt(status.message())
-        )),
-    }
-}
-
-fn request_id<T>(request: &Request<T>) -> String {
+/// The id of a call, for its errors.
+pub fn request_id<T>(request: &Request<T>) -> String {
     request
         .extensions()
         .get::<RequestId>()
         .map(|id| id.0.clone())
         .unwrap_or_default()
-}
-
-/// A scan in chunks: the report, then the scan's bytes in order.
-#[derive(Debug)]
-pub struct ChunkStream<C> {
-    /// The first chunk, until it is sent.
-    report: Option<C>,
-    scan: Bytes,
-    /// Makes a chunk of bytes.
-    data: fn(Bytes) -> C,
-}
-
-impl ChunkStream<InpaintChunk> {
-    fn of_mended(mended: Mended) -> Self {
-        Self {
-            report: Some(InpaintChunk {
-                part: Some(Part::Report(mended.report)),
-            }),
-            scan: mended.bytes.into(),
-            data: |bytes| InpaintChunk {
-                part: Some(Part::Data(bytes)),
-            },
-        }
-    }
-}
-
-impl ChunkStream<StripChunk> {
-    fn of_stripped(stripped: Stripped) -> Self {
-        Self {
-            report: Some(StripChunk {
-                part: Some(strip_chunk::Part::Report(stripped.report)),
-            }),
-            scan: stripped.bytes.into(),
-            data: |bytes| StripChunk {
-                part: Some(strip_chunk::Part::Data(bytes)),
-            },
-        }
-    }
-}
-
-impl<C: Unpin> Stream for ChunkStream<C> {
-    type Item = Result<C, Status>;
-
-    fn poll_next(mut self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<Option<Self::Item>> {
-        let chunk = self.report.take().or_else(|| {
-            let next = self.scan.len().min(CHUNK_BYTES);
-            (next > 0).then(|| (self.data)(self.scan.split_to(next)))
-        });
-        Poll::Ready(chunk.map(Ok))
-    }
 }

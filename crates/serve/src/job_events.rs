@@ -16,11 +16,13 @@ use bytes::Bytes;
 use darn_jobs::{Job, Jobs};
 use hyper::body::Frame;
 use tokio::{select, sync::mpsc, time::sleep};
+use uuid::Uuid;
 
 use super::{
     answer::LiveAnswer, app::App, client::Caller, job_message::message, media_types::EVENT_STREAM,
     response,
 };
+use darn_contract::v1;
 
 /// The version that a client has seen last; browsers send it when they connect again.
 pub const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
@@ -50,15 +52,9 @@ pub fn answer(listener: Listener, job: Job, headers: &HeaderMap) -> Response {
     if job.state.is_finished() && seen == Some(job.version) {
         return StatusCode::NO_CONTENT.into_response();
     }
-    let (events, received) = mpsc::channel(EVENTS_AHEAD);
-    tokio::spawn(async move {
-        // Versions start at 1: whoever has seen none is told the present one.
-        let told = tell(&listener, job, seen.unwrap_or(0), &events);
-        select! {
-            () = told => {}
-            () = events.closed() => {}
-            () = listener.app.stopping.cancelled() => {}
-        }
+    // Versions start at 1: whoever has seen none is told the present one.
+    let received = listen(listener, job.id, seen.unwrap_or(0), |job| {
+        Some(job.map_or(Bytes::from_static(b":\n\n"), event))
     });
     let headers = [
         (header::CONTENT_TYPE, EVENT_STREAM),
@@ -70,8 +66,36 @@ pub fn answer(listener: Listener, job: Job, headers: &HeaderMap) -> Response {
     answer
 }
 
-async fn tell(listener: &Listener, job: Job, mut seen: i64, events: &mpsc::Sender<Bytes>) {
-    let id = job.id;
+/// The changes of a job after the version that was seen, as `answer` tells them: each in the words of `render`, which is asked with nothing
+/// after a while without one.
+pub fn listen<E: Send + 'static>(
+    listener: Listener,
+    job: Uuid,
+    seen: i64,
+    render: fn(Option<&v1::Job>) -> Option<E>,
+) -> mpsc::Receiver<E> {
+    let (events, received) = mpsc::channel(EVENTS_AHEAD);
+    tokio::spawn(async move {
+        let told = Told {
+            events: &events,
+            render,
+        };
+        select! {
+            () = tell(&listener, job, seen, &told) => {}
+            () = events.closed() => {}
+            () = listener.app.stopping.cancelled() => {}
+        }
+    });
+    received
+}
+
+/// How somebody is told.
+struct Told<'a, E> {
+    events: &'a mpsc::Sender<E>,
+    render: fn(Option<&v1::Job>) -> Option<E>,
+}
+
+async fn tell<E>(listener: &Listener, id: Uuid, mut seen: i64, told: &Told<'_, E>) {
     loop {
         let changed = select! {
             () = sleep(COMMENT_EVERY) => None,
@@ -80,32 +104,35 @@ async fn tell(listener: &Listener, job: Job, mut seen: i64, events: &mpsc::Sende
         if !listener.app.still_takes(&listener.caller) {
             return;
         }
-        let text = match changed {
-            None => Bytes::from_static(b":\n\n"),
+        let (event, is_last) = match changed {
+            None => ((told.render)(None), false),
             Some(job) => {
                 // Deleted, or the database failed: the client asks again and is told.
                 let Ok(job) = job else {
                     return;
                 };
                 seen = job.version;
-                let event = event(&job);
-                if job.state.is_finished() {
-                    events.send(event).await.ok();
+                let Ok(message) = message(&listener.jobs, &job).await else {
                     return;
-                }
-                event
+                };
+                ((told.render)(Some(&message)), job.state.is_finished())
             }
         };
-        if events.send(text).await.is_err() {
+        if let Some(event) = event
+            && told.events.send(event).await.is_err()
+        {
+            return;
+        }
+        if is_last {
             return;
         }
     }
 }
 
-fn event(job: &Job) -> Bytes {
+fn event(job: &v1::Job) -> Bytes {
     // JSON has no line breaks of its own.
     let mut text = format!("id: {}\nevent: job\ndata: ", job.version).into_bytes();
-    text.extend_from_slice(&response::json(&message(job)));
+    text.extend_from_slice(&response::json(job));
     text.extend_from_slice(b"\n\n");
     text.into()
 }

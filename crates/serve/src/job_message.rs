@@ -1,30 +1,49 @@
 //! A job as clients see it.
 
 use axum::http::StatusCode;
-use darn_jobs::{CRASHED, Job, Progress, State};
+use darn_jobs::{CRASHED, Delivery, DeliveryOutcome, Job, JobError, Jobs, Progress, State};
 use serde_json::Value;
+use uuid::Uuid;
 
 use super::{
     job_worker::{READING, WAITING},
     response::KeptAnswer,
+    webhook,
 };
 use darn_contract::{codes, v1};
 
+/// The messages of jobs, in their order.
+///
+/// # Errors
+/// The database fails.
+pub async fn messages(jobs: &Jobs, shown: &[Job]) -> Result<Vec<v1::Job>, JobError> {
+    // Only those have something in the outbox.
+    let told = shown.iter().filter(|job| job.webhook.is_some());
+    let told: Vec<Uuid> = told.map(|job| job.id).collect();
+    let deliveries = jobs.store().deliveries(&told).await?;
+    let message = |job| message_of(job, deliveries.get(&job.id));
+    Ok(shown.iter().map(message).collect())
+}
+
 /// The message of a job.
-pub fn message(job: &Job) -> v1::Job {
-    let path = |file: &str| format!("/jobs/{}/{file}", job.id);
+///
+/// # Errors
+/// The database fails.
+pub async fn message(jobs: &Jobs, job: &Job) -> Result<v1::Job, JobError> {
+    let delivery = match &job.webhook {
+        Some(_) => jobs.store().deliveries(&[job.id]).await?.remove(&job.id),
+        None => None,
+    };
+    Ok(message_of(job, delivery.as_ref()))
+}
+
+fn message_of(job: &Job, delivery: Option<&Delivery>) -> v1::Job {
+    let path = |file| path(job.id, file);
     v1::Job {
         id: job.id.to_string(),
         name: job.name.clone(),
         priority: i32::try_from(job.priority).unwrap_or_default(),
-        state: match job.state {
-            State::Waiting => v1::JobState::Waiting,
-            State::Running => v1::JobState::Running,
-            State::Done => v1::JobState::Done,
-            State::Error => v1::JobState::Error,
-            State::Cancelled => v1::JobState::Cancelled,
-        }
-        .into(),
+        state: state(job.state).into(),
         stage: stage(job).to_owned(),
         version: u32::try_from(job.version).unwrap_or(u32::MAX),
         attempt: u32::try_from(job.attempt).unwrap_or_default(),
@@ -40,7 +59,50 @@ pub fn message(job: &Job) -> v1::Job {
         problem: problem(job),
         holes: holes(job, |progress| progress.holes),
         holes_done: holes(job, |progress| progress.hole),
+        webhook: webhook(job, delivery),
     }
+}
+
+/// The path of a file of a job.
+pub fn path(job: Uuid, file: &str) -> String {
+    format!("/jobs/{job}/{file}")
+}
+
+/// A state as messages have it.
+pub fn state(state: State) -> v1::JobState {
+    match state {
+        State::Waiting => v1::JobState::Waiting,
+        State::Running => v1::JobState::Running,
+        State::Done => v1::JobState::Done,
+        State::Error => v1::JobState::Error,
+        State::Cancelled => v1::JobState::Cancelled,
+    }
+}
+
+fn webhook(job: &Job, delivery: Option<&Delivery>) -> Option<v1::JobWebhook> {
+    let url = webhook::shown(job.webhook.as_ref()?);
+    let Some(delivery) = delivery else {
+        return Some(v1::JobWebhook {
+            url,
+            state: v1::WebhookState::Pending.into(),
+            ..v1::JobWebhook::default()
+        });
+    };
+    let state = match delivery.outcome {
+        DeliveryOutcome::Waiting => v1::WebhookState::Pending,
+        DeliveryOutcome::Delivered => v1::WebhookState::Delivered,
+        DeliveryOutcome::GivenUp => v1::WebhookState::GivenUp,
+        DeliveryOutcome::Disabled => v1::WebhookState::Disabled,
+    };
+    Some(v1::JobWebhook {
+        url,
+        state: state.into(),
+        tries: u32::try_from(delivery.tries).unwrap_or_default(),
+        last_status: delivery.last_status.and_then(|it| u32::try_from(it).ok()),
+        last_error: delivery.last_error.clone(),
+        last_try_at: delivery.last_try_at.map(timestamp),
+        next_try_at: delivery.next_try_at.map(timestamp),
+    })
 }
 
 /// What goes with the result of a job; `None` unless it is done.
@@ -118,7 +180,7 @@ fn holes(job: &Job, count: impl Fn(&Progress) -> i64) -> u32 {
 }
 
 /// A time in milliseconds since 1970.
-fn timestamp(milliseconds: i64) -> pbjson_types::Timestamp {
+pub fn timestamp(milliseconds: i64) -> pbjson_types::Timestamp {
     pbjson_types::Timestamp {
         seconds: milliseconds.div_euclid(1000),
         nanos: i32::try_from(milliseconds.rem_euclid(1000) * 1_000_000).unwrap_or_default(),

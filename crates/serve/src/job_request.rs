@@ -1,11 +1,12 @@
 //! What a client asks for when it hands over a scan as a job, and how that is kept with the job.
 
-use axum::http::{HeaderMap, HeaderName, HeaderValue};
+use axum::http::{HeaderMap, HeaderName};
 use darn_jobs::Submission;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    client::{Client, ClientId},
+    app::App,
+    client::{Caller, Client, ClientId},
     error::{ParameterKind, RequestError},
     parameters::Parameters,
     response, traces,
@@ -102,12 +103,13 @@ impl JobRequest {
     }
 }
 
-/// What a request says about its job beside the scan: its key, and from the URL's query its name and its priority.
+/// What a request says about its job beside the scan: its key, and from the URL's query its name, its priority and its webhook.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct JobLabels {
     key: Option<String>,
     name: Option<String>,
     priority: i64,
+    webhook: Option<String>,
 }
 
 impl JobLabels {
@@ -119,7 +121,7 @@ impl JobLabels {
         let mut keys = headers.get_all(IDEMPOTENCY_KEY).iter();
         let key = match (keys.next(), keys.next()) {
             (None, _) => None,
-            (Some(key), None) => Some(checked_key(key)?),
+            (Some(key), None) => Some(checked_key(key.to_str().unwrap_or_default())?),
             (Some(_), Some(_)) => {
                 return Err(malformed("the header `idempotency-key` comes twice"));
             }
@@ -140,15 +142,44 @@ impl JobLabels {
             match name.as_ref() {
                 "name" => labels.name = Some(checked_name(&value)?),
                 "priority" => labels.priority = checked_priority(&value)?,
+                "webhook" => labels.webhook = Some(value.into_owned()),
                 other => {
                     return Err(malformed(&format!(
-                        "`{}` is not known; the URL's query has `name` and `priority`",
+                        "`{}` is not known; the URL's query has `name`, `priority` and `webhook`",
                         excerpt(other)
                     )));
                 }
             }
         }
         Ok(labels)
+    }
+
+    /// What a gRPC call says.
+    ///
+    /// # Errors
+    /// `Malformed`.
+    pub fn of_message(message: v1::JobLabels) -> Result<Self, RequestError> {
+        let key = message.idempotency_key.as_deref().map(checked_key);
+        let name = message.name.as_deref().map(checked_name);
+        Ok(Self {
+            key: key.transpose()?,
+            name: name.transpose()?,
+            priority: in_range(message.priority.into())?,
+            webhook: message.webhook,
+        })
+    }
+
+    /// Checks where the webhook may go, and that its requests can be signed.
+    ///
+    /// # Errors
+    /// `Malformed` or `WebhooksOff`.
+    pub fn checked(self, app: &App, caller: &Caller) -> Result<Self, RequestError> {
+        let webhook = match (&self.webhook, &app.webhooks) {
+            (Some(text), Some(webhooks)) => Some(webhooks.check(text, caller.key.as_ref())?),
+            // Without webhooks there are no jobs, which is said.
+            _ => None,
+        };
+        Ok(Self { webhook, ..self })
     }
 
     /// A submission of a client.
@@ -158,19 +189,18 @@ impl JobLabels {
             idempotency_key: self.key,
             name: self.name,
             priority: self.priority,
-            webhook: None,
+            webhook: self.webhook,
             trace: traces::current_parent(),
             request: request.text(),
         }
     }
 }
 
-fn checked_key(value: &HeaderValue) -> Result<String, RequestError> {
-    let key = value.to_str().unwrap_or_default();
+fn checked_key(key: &str) -> Result<String, RequestError> {
     let is_plain = key.bytes().all(|byte| byte.is_ascii_graphic());
     if !is_plain || !(1..=MAX_KEY_BYTES).contains(&key.len()) {
         return Err(malformed(&format!(
-            "the header `idempotency-key` must have 1 to {MAX_KEY_BYTES} visible ASCII characters"
+            "the idempotency key must have 1 to {MAX_KEY_BYTES} visible ASCII characters"
         )));
     }
     Ok(key.to_owned())
@@ -186,11 +216,17 @@ fn checked_name(name: &str) -> Result<String, RequestError> {
 }
 
 fn checked_priority(text: &str) -> Result<i64, RequestError> {
-    match text.parse() {
-        Ok(priority) if (-MAX_PRIORITY..=MAX_PRIORITY).contains(&priority) => Ok(priority),
-        _ => Err(malformed(&format!(
+    // What is no number is out of range, too.
+    in_range(text.parse().unwrap_or(i64::MAX))
+}
+
+fn in_range(priority: i64) -> Result<i64, RequestError> {
+    if (-MAX_PRIORITY..=MAX_PRIORITY).contains(&priority) {
+        Ok(priority)
+    } else {
+        Err(malformed(&format!(
             "`priority` must be a whole number from -{MAX_PRIORITY} to {MAX_PRIORITY}"
-        ))),
+        )))
     }
 }
 
@@ -200,6 +236,8 @@ fn malformed(detail: &str) -> RequestError {
 
 #[cfg(test)]
 mod tests {
+    use axum::http::HeaderValue;
+
     use super::*;
 
     #[test]
@@ -229,6 +267,40 @@ mod tests {
         ] {
             let refused = JobLabels::of(&headers(&keys), Some(query)).unwrap_err();
             assert_eq!(refused.code().status, 400, "{keys:?} {query}");
+        }
+    }
+
+    #[test]
+    fn labels_of_calls_are_those_of_requests() {
+        let good = v1::JobLabels {
+            name: Some("Coat no. 7 left".to_owned()),
+            priority: -3,
+            webhook: None,
+            idempotency_key: Some("a-1".to_owned()),
+        };
+        let mut headers = HeaderMap::new();
+        headers.insert(IDEMPOTENCY_KEY, HeaderValue::from_static("a-1"));
+        let query = "name=Coat%20no.%207+left&priority=-3";
+        assert_eq!(
+            JobLabels::of_message(good.clone()).unwrap(),
+            JobLabels::of(&headers, Some(query)).unwrap()
+        );
+        for bad in [
+            v1::JobLabels {
+                name: Some("\0".to_owned()),
+                ..good.clone()
+            },
+            v1::JobLabels {
+                priority: 101,
+                ..good.clone()
+            },
+            v1::JobLabels {
+                idempotency_key: Some(String::new()),
+                ..good
+            },
+        ] {
+            let refused = JobLabels::of_message(bad).unwrap_err();
+            assert_eq!(refused.code().status, 400);
         }
     }
 

@@ -18,14 +18,15 @@ use uuid::Uuid;
 
 use super::{
     app::App,
-    body::{self, ScanRequest},
+    body,
     client::Caller,
     error::RequestError,
     job_answer,
     job_events::{self, Listener},
-    job_message::{message, problem_document},
+    job_message::{message, messages, problem_document},
     job_quota,
-    job_request::{JobLabels, JobRequest, KeptConstraints},
+    job_request::{JobLabels, JobRequest},
+    job_upload::{self, JobUpload},
     key_file::Scope,
     media_types::{JSON, PROBLEM_JSON},
     prefer::{PREFERENCE_APPLIED, Preferences},
@@ -35,9 +36,9 @@ use super::{
 use darn_contract::{excerpt, v1};
 
 /// Jobs of a page, where the query does not say.
-const DEFAULT_LIMIT: u32 = 50;
+pub const DEFAULT_LIMIT: u32 = 50;
 /// Most jobs of a page.
-const MAX_LIMIT: u32 = 200;
+pub const MAX_LIMIT: u32 = 200;
 
 /// The routes below `/jobs`.
 pub fn routes() -> Router<Arc<App>> {
@@ -62,45 +63,79 @@ impl FromRequestParts<Arc<App>> for KeptJobs {
     }
 }
 
-/// The job of the id in a path, which the caller may see: for all others it does not exist.
-struct KnownJob {
-    jobs: Arc<Jobs>,
-    job: Job,
+/// A job that the caller may see: for all others it does not exist.
+pub struct KnownJob {
+    /// All jobs.
+    pub jobs: Arc<Jobs>,
+    /// This one.
+    pub job: Job,
 }
 
 impl FromRequestParts<Arc<App>> for KnownJob {
     type Rejection = RequestError;
 
     async fn from_request_parts(parts: &mut Parts, app: &Arc<App>) -> Result<Self, RequestError> {
-        let KeptJobs(jobs) = KeptJobs::from_request_parts(parts, app).await?;
+        // A text that cannot be read is no id, either.
+        let text = Path::<String>::from_request_parts(parts, app).await;
+        let text = text.map(|Path(text)| text).unwrap_or_default();
+        Self::find(app, &Caller::of(&parts.extensions), &text).await
+    }
+}
+
+impl KnownJob {
+    /// The job of an id.
+    ///
+    /// # Errors
+    /// `JobsNotKept` or `NoSuchJob`.
+    pub async fn find(app: &App, caller: &Caller, id: &str) -> Result<Self, RequestError> {
+        let jobs = app.jobs.clone().ok_or(RequestError::JobsNotKept)?;
         // A text that is not an id is an unknown job.
-        let Ok(Path(text)) = Path::<String>::from_request_parts(parts, app).await else {
-            return Err(RequestError::NoSuchJob);
-        };
-        let id = Uuid::try_parse(&text).map_err(|_| RequestError::NoSuchJob)?;
+        let id = Uuid::try_parse(id).map_err(|_| RequestError::NoSuchJob)?;
         let job = jobs.get(id).await?;
-        if Caller::of(&parts.extensions).sees(&job) {
+        if caller.sees(&job) {
             Ok(Self { jobs, job })
         } else {
             Err(RequestError::NoSuchJob)
         }
     }
+
+    /// Cancels it.
+    ///
+    /// # Errors
+    /// `JobWrongState`.
+    pub async fn cancel(&self) -> Result<v1::Job, RequestError> {
+        let cancelled = self.jobs.cancel(self.job.id).await?;
+        Ok(message(&self.jobs, &cancelled).await?)
+    }
+
+    /// Lets it wait again.
+    ///
+    /// # Errors
+    /// `JobWrongState`, `JobExpired` or `Quota`.
+    pub async fn retry(&self, caller: &Caller) -> Result<v1::Job, RequestError> {
+        let _turn = job_quota::turn(&self.jobs, caller).await?;
+        let retried = self.jobs.retry(self.job.id).await?;
+        Ok(message(&self.jobs, &retried).await?)
+    }
 }
 
 async fn submit(State(app): State<Arc<App>>, request: Request) -> Result<Response, RequestError> {
-    let labels = JobLabels::of(request.headers(), request.uri().query());
+    let labels = JobLabels::of(request.headers(), request.uri().query())
+        .and_then(|labels| labels.checked(&app, &Caller::of(request.extensions())));
     let jobs = match Caller::of(request.extensions()).may_hand_over() {
         true => app.jobs.as_ref().ok_or(RequestError::JobsNotKept),
         false => Err(RequestError::InsufficientScope { scope: Scope::Jobs }),
     };
-    let job = match (jobs, labels) {
-        (Ok(jobs), Ok(labels)) => hand_over(&app, jobs, request, labels).await?,
+    match (jobs, labels) {
+        (Ok(jobs), Ok(labels)) => {
+            let job = hand_over(&app, jobs, request, labels).await?;
+            accepted(jobs, &job).await
+        }
         (Err(error), _) | (_, Err(error)) => {
             body::discard(request, &app.limits);
-            return Err(error);
+            Err(error)
         }
-    };
-    Ok(accepted(&job))
+    }
 }
 
 /// `POST /inpaint` of a client that prefers a job: waits as long as it allows, then answers with the job.
@@ -158,7 +193,7 @@ async fn inpaint_within(
             answer
         }
         JobState::Error => failed(&job, id),
-        JobState::Waiting | JobState::Running | JobState::Cancelled => accepted(&job),
+        JobState::Waiting | JobState::Running | JobState::Cancelled => accepted(jobs, &job).await?,
     })
 }
 
@@ -175,18 +210,18 @@ async fn hand_over(
         body::discard(request, &app.limits);
         return Err(error);
     }
-    let ScanRequest {
-        scan,
+    let JobUpload {
+        input,
         files,
-        parameters,
-        upload,
-    } = body::receive_job_scan::<KeptConstraints>(app, request).await?;
-    let asked = JobRequest::new(parameters, files.answer(&headers).form);
-    let submission = labels.submission(upload.client(), &asked);
+        constraints,
+        permit,
+    } = job_upload::receive(app, jobs, request).await?;
+    let asked = JobRequest::new(constraints, files.answer(&headers).form);
+    let submission = labels.submission(permit.client(), &asked);
     let turn = job_quota::turn(jobs, &caller).await?;
-    let job = jobs.submit(submission, &scan[..]).await?.into_job();
+    let job = jobs.submit_received(submission, input).await?.into_job();
     drop(turn);
-    drop(upload);
+    drop(permit);
     Ok(job)
 }
 
@@ -209,13 +244,14 @@ async fn finished_within(
 }
 
 /// The answer of a job that was handed over.
-fn accepted(job: &Job) -> Response {
+async fn accepted(jobs: &Jobs, job: &Job) -> Result<Response, RequestError> {
     let headers = [
         (header::CONTENT_TYPE, JSON.to_owned()),
         (header::CACHE_CONTROL, "no-store".to_owned()),
         (header::LOCATION, format!("/jobs/{}", job.id)),
     ];
-    (StatusCode::ACCEPTED, headers, response::json(&message(job))).into_response()
+    let message = response::json(&message(jobs, job).await?);
+    Ok((StatusCode::ACCEPTED, headers, message).into_response())
 }
 
 /// The problem document of a job that has failed, as the answer of this request.
@@ -238,15 +274,28 @@ async fn list(
     caller: Caller,
     uri: Uri,
 ) -> Result<Response, RequestError> {
+    let page = page(&jobs, &caller, list_query(uri.query())?).await?;
+    Ok(response::json_response(response::json(&page)))
+}
+
+/// A page of the jobs that a caller may see.
+///
+/// # Errors
+/// `Internal` where the database fails.
+pub async fn page(
+    jobs: &Jobs,
+    caller: &Caller,
+    query: ListQuery,
+) -> Result<v1::JobList, RequestError> {
     let query = ListQuery {
         client: caller.only_jobs_of().map(ToString::to_string),
-        ..list_query(uri.query())?
+        ..query
     };
     let page = jobs.list(&query).await?;
-    Ok(response::json_response(response::json(&v1::JobList {
-        jobs: page.jobs.iter().map(message).collect(),
+    Ok(v1::JobList {
+        jobs: messages(jobs, &page.jobs).await?,
         next: page.next.map(|number| number.to_string()),
-    })))
+    })
 }
 
 fn list_query(query: Option<&str>) -> Result<ListQuery, RequestError> {
@@ -291,8 +340,8 @@ fn list_query(query: Option<&str>) -> Result<ListQuery, RequestError> {
     Ok(wanted)
 }
 
-async fn describe(known: KnownJob) -> Response {
-    described(&known.job)
+async fn describe(KnownJob { jobs, job }: KnownJob) -> Result<Response, RequestError> {
+    Ok(described(&message(&jobs, &job).await?))
 }
 
 async fn result(
@@ -316,13 +365,12 @@ async fn events(
     job_events::answer(Listener { app, jobs, caller }, job, &headers)
 }
 
-async fn cancel(KnownJob { jobs, job }: KnownJob) -> Result<Response, RequestError> {
-    Ok(described(&jobs.cancel(job.id).await?))
+async fn cancel(known: KnownJob) -> Result<Response, RequestError> {
+    Ok(described(&known.cancel().await?))
 }
 
-async fn retry(KnownJob { jobs, job }: KnownJob, caller: Caller) -> Result<Response, RequestError> {
-    let _turn = job_quota::turn(&jobs, &caller).await?;
-    Ok(described(&jobs.retry(job.id).await?))
+async fn retry(known: KnownJob, caller: Caller) -> Result<Response, RequestError> {
+    Ok(described(&known.retry(&caller).await?))
 }
 
 async fn delete(KnownJob { jobs, job }: KnownJob) -> Result<StatusCode, RequestError> {
@@ -330,6 +378,6 @@ async fn delete(KnownJob { jobs, job }: KnownJob) -> Result<StatusCode, RequestE
     Ok(StatusCode::NO_CONTENT)
 }
 
-fn described(job: &Job) -> Response {
-    response::json_response(response::json(&message(job)))
+fn described(job: &v1::Job) -> Response {
+    response::json_response(response::json(job))
 }

@@ -16,13 +16,15 @@ use tokio_util::sync::CancellationToken;
 use tracing::{Instrument as _, error, info, info_span, warn};
 
 use super::{
-    app::{App, DurableSize},
+    app::App,
     counted::{counted, take},
     error::RequestError,
     job_request::JobRequest,
     pool::JobTurn,
+    request_limits::DurableSize,
     response::{self, KeptMend, MendResponse},
     traces,
+    webhook::sender::WebhookSender,
 };
 use darn_budget::Listener;
 use darn_contract::codes;
@@ -77,8 +79,8 @@ impl JobWorker {
         }
     }
 
-    /// Runs jobs once `ready` is, until the service shuts down; then gives back those that run and closes the database. All the time it
-    /// says that this instance lives.
+    /// Runs jobs once `ready` is, and tells webhooks of ended ones, until the service shuts down; then gives back those that run and closes the
+    /// database. All the time it says that this instance lives.
     pub async fn work_once(self, ready: impl Future<Output = ()>) {
         let instance = self.app.instance.name().to_string();
         let mut beside = JoinSet::new();
@@ -90,6 +92,9 @@ impl JobWorker {
             let (jobs, instance) = (Arc::clone(&self.jobs), instance.clone());
             async move { jobs.live_as(&instance).await }
         });
+        let telling = self
+            .webhooks()
+            .map(|sender| tokio::spawn(sender.deliver_all()));
         let jobs = Arc::clone(&self.jobs);
         let worker = Arc::new(self);
         select! {
@@ -97,10 +102,22 @@ impl JobWorker {
             () = ready => worker.claim_and_run().await,
         }
         beside.shutdown().await;
+        if let Some(telling) = telling {
+            telling.await.ok();
+        }
         if let Err(error) = jobs.store().instance_ends(&instance).await {
             warn!(?error, "the database was not told that this instance ends");
         }
         jobs.close().await;
+    }
+
+    fn webhooks(&self) -> Option<WebhookSender> {
+        Some(WebhookSender {
+            app: Arc::clone(&self.app),
+            jobs: Arc::clone(&self.jobs),
+            webhooks: Arc::clone(self.app.webhooks.as_ref()?),
+            stop: self.stop.clone(),
+        })
     }
 
     async fn claim_and_run(self: &Arc<Self>) {

@@ -5,7 +5,8 @@
 //!   "defaults": {"requestsPerMinute": 120},
 //!   "keys": [
 //!     {"id": "textile-lab", "sha256": "66687aad…", "scopes": ["mend", "jobs"],
-//!      "limits": {"bytesPerDay": 10000000000, "waitingJobs": 50}, "expires": "2027-01-01T00:00:00Z"}
+//!      "limits": {"bytesPerDay": 10000000000, "waitingJobs": 50}, "expires": "2027-01-01T00:00:00Z",
+//!      "webhookSecrets": ["whsec_…"]}
 //!   ]
 //! }
 //! ```
@@ -25,7 +26,7 @@ use serde::{
     de::{Error as _, MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer},
 };
 
-use super::key_secret::SecretDigest;
+use super::{key_secret::SecretDigest, webhook::WebhookSecrets};
 
 /// Most letters of a key's id.
 const MAX_ID_LENGTH: usize = 64;
@@ -157,6 +158,9 @@ pub struct KeyEntry {
     /// From when on it is refused; left out, never.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expires: Option<Expiry>,
+    /// What signs the webhooks of its jobs; left out, the secret of the service.
+    #[serde(default, skip_serializing_if = "WebhookSecrets::is_empty")]
+    pub webhook_secrets: WebhookSecrets,
 }
 
 /// The name of a key: 1 to 64 letters, digits, `-` and `_`. So it is never the text of an address, by which jobs of a service without keys

@@ -15,6 +15,7 @@ use super::{
     key_file::{Expiry, KeyEntry, KeyFile, KeyId, KeyLimits, Scope},
     key_secret::{Secret, SecretDigest},
     quota::Usage,
+    webhook::WebhookSecrets,
 };
 use darn_jobs::RunningLimits;
 
@@ -61,6 +62,8 @@ pub struct Key {
     pub limits: KeyLimits,
     /// From when on it is refused.
     pub expires: Option<Expiry>,
+    /// What signs the webhooks of its jobs; empty: the secret of the service.
+    pub webhook_secrets: WebhookSecrets,
     /// What it has used of its limits.
     pub usage: Arc<Usage>,
     digest: SecretDigest,
@@ -75,6 +78,7 @@ impl Key {
             digest: entry.sha256.0,
             scopes: entry.scopes,
             expires: entry.expires,
+            webhook_secrets: entry.webhook_secrets,
             id: entry.id,
         }
     }
@@ -190,6 +194,13 @@ impl KeyRing {
             Some(key) if key.has_expired(now) => Err(KeyRefusal::Expired),
             Some(key) => Ok(key),
         }
+    }
+
+    /// The key of an id, unless it has expired.
+    pub fn find(&self, id: &KeyId, now: SystemTime) -> Option<Arc<Key>> {
+        let keys = self.keys();
+        let found = keys.iter().find(|key| key.id == *id)?;
+        (!found.has_expired(now)).then(|| Arc::clone(found))
     }
 
     /// Whether a key that was taken before is still there, with the same secret, and has not expired.

@@ -30,6 +30,8 @@ pub mod generated {
     include!(concat!(env!("OUT_DIR"), "/darn.v1.rs"));
 }
 mod grpc;
+mod grpc_chunks;
+mod grpc_jobs;
 mod healthcheck;
 mod instance;
 mod job_answer;
@@ -38,6 +40,7 @@ mod job_message;
 mod job_quota;
 mod job_request;
 mod job_routes;
+mod job_upload;
 mod job_worker;
 mod kept_session;
 mod key_file;
@@ -55,6 +58,7 @@ mod problem;
 mod quota;
 mod quota_check;
 mod request_body;
+mod request_limits;
 mod response;
 mod result_cache;
 mod routes;
@@ -69,6 +73,7 @@ mod threads;
 mod tls;
 mod traces;
 mod uploads;
+mod webhook;
 
 use std::{
     io,
@@ -96,6 +101,7 @@ pub use self::{
     telemetry::{LogDelivery, LogError, LogFormat, start_logging},
     tls::TlsError,
     traces::{TraceGuard, start_traces},
+    webhook::{WebhookArgs, WebhookSettingsError},
 };
 use self::{connections::Listener, job_worker::JobWorker};
 use darn_contract::{error_chain, port::Mender};
@@ -157,6 +163,9 @@ pub enum ServeError {
     /// The certificate cannot be used.
     #[error(transparent)]
     Tls(#[from] TlsError),
+    /// The settings of webhooks cannot be used.
+    #[error(transparent)]
+    Webhooks(#[from] WebhookSettingsError),
     /// The warm-up mend failed, so no request could succeed.
     #[error("the warm-up mend failed: {0}")]
     WarmUp(String),
@@ -359,7 +368,11 @@ fn grpc_routes(app: &Arc<App>) -> Router<Arc<App>> {
     use tower::ServiceExt as _;
     let service = grpc::service(app)
         .map_request(|request: axum::extract::Request| request.map(tonic::body::Body::new));
-    Router::new().route_service("/darn.v1.Darn/{method}", service)
+    let jobs = grpc_jobs::service(app)
+        .map_request(|request: axum::extract::Request| request.map(tonic::body::Body::new));
+    Router::new()
+        .route_service("/darn.v1.Darn/{method}", service)
+        .route_service("/darn.v1.Jobs/{method}", jobs)
 }
 
 async fn upkeep(app: Arc<App>) {

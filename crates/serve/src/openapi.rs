@@ -40,7 +40,7 @@ pub fn document() -> Value {
             "summary": "Mends holes in scanned fabric",
             "description": "A scan (glTF) goes in; a scan whose holes are filled with plausible cloth comes out. \
                 Errors are problem documents (RFC 9457) with a stable `code`. Every answer carries `x-request-id`; \
-                a caller may give its own. The same jobs are served over gRPC as darn.v1.Darn.",
+                a caller may give its own. The same is served over gRPC as darn.v1.Darn and darn.v1.Jobs.",
         },
         "paths": {
             "/inpaint": { "post": inpaint() },
@@ -72,6 +72,7 @@ pub fn document() -> Value {
                 "responses": { "200": { "description": "The document", "content": { JSON: {} } } },
             } },
         },
+        "webhooks": { "jobEnded": { "post": jobs::webhook() } },
         "components": { "schemas": schemas, "responses": keys::answers(), "securitySchemes": keys::schemes() },
     });
     keys::add(&mut document["paths"]);

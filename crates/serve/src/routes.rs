@@ -324,6 +324,10 @@ async fn metrics(State(app): State<Arc<App>>) -> impl IntoResponse {
             }
             Err(error) => warn!(?error, "the jobs cannot be counted"),
         }
+        match jobs.store().waiting_deliveries().await {
+            Ok(waiting) => app.metrics.webhooks_waiting(waiting),
+            Err(error) => warn!(?error, "the webhooks cannot be counted"),
+        }
     }
     ([(header::CONTENT_TYPE, PROMETHEUS)], app.metrics.render())
 }

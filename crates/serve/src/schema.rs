@@ -13,6 +13,18 @@ use darn_contract::v1;
 const PACKAGE: &str = "darn.v1";
 /// Fields whose numbers may be NaN, which is null in JSON.
 const MAY_BE_NAN: [&str; 2] = ["map", "map_gradient"];
+/// Messages that only gRPC uses.
+const ONLY_GRPC: [&str; 9] = [
+    "ScanChunk",
+    "InpaintChunk",
+    "StripChunk",
+    "JobChunk",
+    "JobLabels",
+    "JobId",
+    "JobQuery",
+    "JobEventsQuery",
+    "JobDeleted",
+];
 /// Field numbers in descriptor.proto, as paths of comments use them: messages and enums of a file, fields of a message.
 const MESSAGES: i32 = 4;
 const ENUMS: i32 = 5;
@@ -25,9 +37,9 @@ pub(super) fn schemas() -> Map<String, Value> {
     let Some(file) = set.file.iter().find(|file| file.package() == PACKAGE) else {
         return Map::new();
     };
-    let messages = (0..).zip(&file.message_type).filter(|(_, message)| {
-        !matches!(message.name(), "ScanChunk" | "InpaintChunk" | "StripChunk")
-    });
+    let messages = (0..)
+        .zip(&file.message_type)
+        .filter(|(_, message)| !ONLY_GRPC.contains(&message.name()));
     let messages =
         messages.map(|(i, message)| (message.name().to_owned(), object(file, i, message)));
     let enums = (0..)

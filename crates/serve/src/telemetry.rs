@@ -231,6 +231,21 @@ impl Metrics {
             None,
             "durable jobs that run".into(),
         );
+        recorder.describe_counter(
+            "darn_webhooks_total".into(),
+            None,
+            "tries to tell a webhook of a job's end, by what came of them".into(),
+        );
+        recorder.describe_histogram(
+            "darn_webhook_seconds".into(),
+            seconds,
+            "time of a try to tell a webhook".into(),
+        );
+        recorder.describe_gauge(
+            "darn_webhooks_waiting".into(),
+            None,
+            "ends of jobs that webhooks are still to be told of".into(),
+        );
         recorder.describe_gauge("darn_sessions".into(), None, "sessions open".into());
         recorder.describe_gauge(
             "darn_session_bytes".into(),
@@ -293,15 +308,29 @@ impl Metrics {
 
     /// Sets how many durable jobs wait and run.
     pub fn durable_jobs(&self, waiting: i64, running: i64) {
-        for (name, jobs) in [
-            ("darn_jobs_waiting", waiting),
-            ("darn_jobs_running", running),
-        ] {
-            let gauge = self
-                .recorder
-                .register_gauge(&Key::from_name(name), &METADATA);
-            gauge.set(jobs as f64);
-        }
+        self.set("darn_jobs_waiting", waiting);
+        self.set("darn_jobs_running", running);
+    }
+
+    /// Sets how many ends of jobs webhooks are still to be told of.
+    pub fn webhooks_waiting(&self, waiting: i64) {
+        self.set("darn_webhooks_waiting", waiting);
+    }
+
+    fn set(&self, name: &'static str, value: i64) {
+        let gauge = self
+            .recorder
+            .register_gauge(&Key::from_name(name), &METADATA);
+        gauge.set(value as f64);
+    }
+
+    /// Records a try to tell a webhook; `end` is what came of it.
+    pub fn webhook_tried(&self, end: &'static str, took: Duration) {
+        self.counter("darn_webhooks_total", vec![Label::new("end", end)])
+            .increment(1);
+        let key = Key::from_name("darn_webhook_seconds");
+        let times = self.recorder.register_histogram(&key, &METADATA);
+        times.record(took.as_secs_f64());
     }
 
     /// Records an answer; `route` is the route's pattern, not the caller's path.

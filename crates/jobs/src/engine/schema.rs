@@ -17,11 +17,13 @@ struct Steps(&'static [&'static str]);
 const SQLITE: Steps = Steps(&[
     include_str!("../../migrations/sqlite/1.sql"),
     include_str!("../../migrations/sqlite/2.sql"),
+    include_str!("../../migrations/sqlite/3.sql"),
 ]);
 /// The tables in PostgreSQL.
 const POSTGRES: Steps = Steps(&[
     include_str!("../../migrations/postgres/1.sql"),
     include_str!("../../migrations/postgres/2.sql"),
+    include_str!("../../migrations/postgres/3.sql"),
 ]);
 
 impl MigrationSource<'static> for Steps {

@@ -7,7 +7,7 @@ use crate::{
     blobs::BlobName,
     engine::{Urgency, Value, args},
     error::JobError,
-    job::{CRASHED, Job, MAX_ATTEMPTS, Retention, State},
+    job::{CRASHED, Job, MAX_ATTEMPTS, Retention},
 };
 
 /// Most jobs that one call takes on, so that none holds the database for long.
@@ -121,11 +121,7 @@ impl Store {
         );
         let args = args![self.now(), retention.rows_ms, retention.jobs, BATCH];
         let change = "DELETE FROM jobs WHERE id = $2 AND version = $3 RETURNING id";
-        let freed = self.free(&find, args, change).await?;
-        let old = format!("DELETE FROM outbox WHERE created_at <= {now} - $2");
-        let args = args![self.now(), retention.rows_ms];
-        self.engine.write(Urgency::EvenWhenFull, &old, args).await?;
-        Ok(freed)
+        self.free(&find, args, change).await
     }
 
     /// Makes a change (`$1` the time, `$2` the job, `$3` its version) to each of the jobs found. One that has changed since then, because a client
@@ -179,21 +175,5 @@ impl Store {
             }
         }
         Ok(named)
-    }
-
-    /// Ends that wait to be told to webhooks: the job, its version, its state. Nothing takes them yet.
-    pub async fn outbox(&self) -> Result<Vec<(uuid::Uuid, i64, State)>, JobError> {
-        let sql =
-            "SELECT job, version, state FROM outbox ORDER BY next_try_at, job, version LIMIT $1";
-        let rows = self.engine.read(sql, args![BATCH]).await?;
-        (rows.iter())
-            .map(|row| {
-                Ok((
-                    row.some("job", Row::id)?,
-                    row.some("version", Row::int)?,
-                    super::state(row)?,
-                ))
-            })
-            .collect()
     }
 }

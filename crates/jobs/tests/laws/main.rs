@@ -9,6 +9,7 @@ mod full_disk;
 mod instances;
 mod kills;
 mod model;
+mod outbox;
 mod postgres;
 mod requests;
 mod running;

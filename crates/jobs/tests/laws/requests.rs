@@ -1,6 +1,6 @@
 //! What clients can do with their jobs.
 
-use darn_jobs::{JobError, ListQuery, Outcome, Retention, State, Submission, Submitted};
+use darn_jobs::{JobError, ListQuery, State, Submission, Submitted};
 
 use crate::bench::{Bench, claim, failed, law, nobody, product, submission, submit};
 
@@ -134,41 +134,5 @@ law! {
         let counts = jobs.counts().await.unwrap();
         assert_eq!((counts[&State::Waiting], counts[&State::Cancelled], counts[&State::Done]), (15, 8, 0));
         assert_eq!(jobs.client_counts("a").await.unwrap().waiting, 8);
-    }
-}
-
-law! {
-    async fn every_end_is_told_to_the_outbox_once(bench: Bench) {
-        let jobs = bench.open().await;
-        let told = Submission { webhook: Some("https://example.org".to_owned()), ..submission("client") };
-        let mut ended = Vec::new();
-        for outcome in [Some(failed()), None] {
-            let id = jobs.submit(told.clone(), &b"scan"[..]).await.unwrap().into_job().id;
-            submit(&jobs, "nobody listens").await;
-            let mut claimed = claim(jobs.store()).await.unwrap();
-            if claimed.job.id != id {
-                claimed = claim(jobs.store()).await.unwrap();
-            }
-            // What does not end it tells nothing.
-            jobs.store().end(claimed.lease, &Outcome::GivenBack).await.unwrap();
-            ended.push(match outcome {
-                Some(outcome) => loop {
-                    let claimed = claim(jobs.store()).await.unwrap();
-                    let job = jobs.store().end(claimed.lease, &outcome).await.unwrap();
-                    if job.id == id {
-                        break job;
-                    }
-                },
-                None => jobs.cancel(id).await.unwrap(),
-            });
-        }
-        let mut expected: Vec<_> = ended.iter().map(|job| (job.id, job.version, job.state)).collect();
-        expected.sort();
-        let mut outbox = jobs.store().outbox().await.unwrap();
-        outbox.sort();
-        assert_eq!(outbox, expected);
-        bench.clock.advance(Retention::default().rows_ms);
-        jobs.retain().await.unwrap();
-        assert_eq!(jobs.store().outbox().await.unwrap(), []);
     }
 }

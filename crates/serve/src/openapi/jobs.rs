@@ -11,7 +11,8 @@ pub(super) fn submit() -> Value {
         "202",
         accepted(),
         "Constraints that are valid with no scan; `errors` names them. With code `idempotency_mismatch`: the key came before with another \
-            payload. What is wrong with the scan itself becomes the job's `problem`",
+            payload; with code `webhooks_off`: the service has no secret to sign webhooks with. What is wrong with the scan itself becomes the job's \
+            `problem`",
     );
     if let Some(answers) = answers.as_object_mut() {
         // Nobody waits for the mend.
@@ -30,9 +31,41 @@ pub(super) fn submit() -> Value {
                 json!({ "type": "integer", "minimum": -100, "maximum": 100, "default": 0 }),
                 "Of a client's jobs those with a higher priority start first",
             ),
+            query(
+                "webhook",
+                json!({ "type": "string", "format": "uri", "maxLength": 2000 }),
+                "Where the end of the job is told, by a request as `webhooks` of this document describes it: an https URL of a public address",
+            ),
         ],
         "requestBody": body(&[("constraints", "Constraints")], &[]),
         "responses": with(answers, &[NOT_KEPT, ("507", "The disk on which jobs are kept is full")]),
+    })
+}
+
+/// What a webhook is sent.
+pub(super) fn webhook() -> Value {
+    let header = |name: &str, description: &str| json!({ "name": name, "in": "header", "required": true, "description": description, "schema": { "type": "string" } });
+    json!({
+        "summary": "A job has ended",
+        "description": "Sent to the webhook of a job when it is done, has failed or is cancelled, and again later until an answer has a status of \
+            200 to 299: ten times in some three days. 410 ends that for this job. Redirects are not followed. An event may come twice, and events of \
+            a job that was retried in another order; its `version` tells",
+        "operationId": "jobEnded",
+        "security": [],
+        "parameters": [
+            header("webhook-id", "The same in all tries of this event, and in no other one"),
+            header("webhook-timestamp", "When this try was made, in seconds since 1970"),
+            header(
+                "webhook-signature",
+                "`v1,` and the base64 of the HMAC-SHA256 of id, timestamp and body with full stops between \
+                    (https://www.standardwebhooks.com); of several secrets several, with a space between",
+            ),
+        ],
+        "requestBody": { "required": true, "content": { JSON: { "schema": reference("WebhookEvent") } } },
+        "responses": {
+            "2XX": { "description": "Taken" },
+            "410": { "description": "Nothing more is to be told of this job" },
+        },
     })
 }
 
