@@ -367,7 +367,7 @@ async fn a_shutdown_waits_for_uploads_and_times_out_stalled_ones() {
 #[test]
 fn settings_out_of_bounds_are_refused_by_name() {
     for (flag, value, said) in [
-        ("--workers", "100000000", "from 1 to 1024"),
+        ("--workers", "100000000", "from 0 to 1024"),
         ("--queue", "18446744073709551615", "from 0 to 65536"),
         ("--uploads", "0", "from 1 to 65536"),
         ("--connections", "0", "from 1 to 1048576"),

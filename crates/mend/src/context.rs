@@ -18,6 +18,17 @@ pub struct HoleContext<'a> {
     pub inpainter: Inpainter<'a>,
     /// The limits and options, and what filling it may cost.
     pub call: Call<'a>,
+    /// Whether each patch starts from the one before.
+    pub pace: Pace,
+}
+
+/// How a hole is filled when something pulls at it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pace {
+    /// From the start: the same request gives the same bits.
+    Anew,
+    /// From the last patch, for one of many that a drag shows.
+    Dragged,
 }
 
 impl<'a> HoleContext<'a> {
@@ -35,6 +46,7 @@ impl<'a> HoleContext<'a> {
             unedited: hole.unedited(inpainter, call)?,
             inpainter: inpainter.clone(),
             call,
+            pace: Pace::Anew,
         })
     }
 }

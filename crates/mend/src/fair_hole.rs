@@ -55,6 +55,7 @@ impl FairHole {
             ..region.clone()
         });
         let work = PatchWork {
+            last: None,
             options: &call.mender.limits.patch,
             budget,
         };

@@ -3,8 +3,9 @@
 use std::time::Instant;
 
 use crate::constraints::HoleConstraints;
-use crate::context::HoleContext;
+use crate::context::{HoleContext, Pace};
 use crate::error::MendError;
+use crate::hole::PatchPulls;
 use crate::prepared_hole::HoleRef;
 use crate::select::HoleRequest;
 use crate::timings::milliseconds;
@@ -73,7 +74,15 @@ impl<'a> HoleContext<'a> {
         let stretch = |patch: &Patch| quality::measure(patch, &hole.region).stretch_max;
         let usual = stretch(&unedited.patch);
         let most = stretch_limit(usual);
-        let patch = |filled: &[Vec3]| hole.patch(filled, pulls, unedited.network_share, self.call);
+        let pulls = PatchPulls {
+            pulls,
+            last: match self.pace {
+                Pace::Anew => None,
+                Pace::Dragged => Some(&unedited.strain),
+            },
+        };
+        let patch =
+            |filled: &[Vec3]| hole.pulled_patch(filled, pulls, unedited.network_share, self.call);
         let mut share = 1.0;
         for _ in 0..MAX_TRIES {
             let each = unedited.filled.iter().zip(moved);

@@ -17,7 +17,7 @@ use darn_geometry::grid::{self, CELLS, Grid, NormalGrid, Normalisation};
 use darn_geometry::mesh::index::LoopId;
 use darn_geometry::mesh::region::Region;
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
-use darn_geometry::patch::{Patch, PatchPlan, PatchWork, Pull};
+use darn_geometry::patch::{LastStrain, Patch, PatchPlan, PatchWork, Pull};
 use darn_geometry::polygon;
 use darn_net::Averaging;
 
@@ -81,12 +81,23 @@ pub struct UneditedCloth {
     pub filled: Vec<Vec3>,
     /// What the network says of the cells that were moved last.
     pub held: LastHeldFill,
+    /// The last patch of a drag.
+    pub strain: LastStrain,
     /// The patch made of it.
     pub patch: Patch,
     /// Milliseconds of the network.
     pub net_ms: f64,
     /// Milliseconds of meshing.
     pub patch_ms: f64,
+}
+
+/// What pulls at a patch.
+#[derive(Clone, Copy, Default)]
+pub struct PatchPulls<'a> {
+    /// The pulls.
+    pub pulls: &'a [Pull],
+    /// The last patch of a drag, to start from.
+    pub last: Option<&'a LastStrain>,
 }
 
 impl Hole {
@@ -137,12 +148,13 @@ impl Hole {
         let net_ms = milliseconds(started);
         let started = Instant::now();
         let filled = self.filled(&predicted);
-        let patch = self.patch(&filled, &[], network_share, call)?;
+        let patch = self.patch(&filled, network_share, call)?;
         Ok(UneditedCloth {
             network_share,
             predicted,
             filled,
             held: LastHeldFill::default(),
+            strain: LastStrain::default(),
             patch,
             net_ms,
             patch_ms: milliseconds(started),
@@ -198,7 +210,20 @@ impl Hole {
     pub fn patch(
         &self,
         filled: &[Vec3],
-        pulls: &[Pull],
+        network_share: f32,
+        call: Call,
+    ) -> Result<Patch, MendError> {
+        self.pulled_patch(filled, PatchPulls::default(), network_share, call)
+    }
+
+    /// The same with pulls.
+    ///
+    /// # Errors
+    /// As [`Hole::patch`].
+    pub fn pulled_patch(
+        &self,
+        filled: &[Vec3],
+        pulls: PatchPulls,
         network_share: f32,
         call: Call,
     ) -> Result<Patch, MendError> {
@@ -207,9 +232,10 @@ impl Hole {
         let work = PatchWork {
             options: &options,
             budget: call.budget,
+            last: pulls.last,
         };
         self.plan
-            .patch(&self.chart, filled, pulls, work)
+            .patch(&self.chart, filled, pulls.pulls, work)
             .map_err(MendError::patch(self.id))
     }
 
@@ -242,9 +268,10 @@ impl UneditedCloths {
 
     fn bytes(&self) -> usize {
         let kept = self.lock();
-        let each = kept
-            .iter()
-            .map(|(_, u)| 3 * 24 * CELLS + 40 * u.patch.positions.len() + 12 * u.patch.faces.len());
+        let each = kept.iter().map(|(_, u)| {
+            let patch = 40 * u.patch.positions.len() + 12 * u.patch.faces.len();
+            3 * 24 * CELLS + patch + u.strain.bytes()
+        });
         each.sum()
     }
 

@@ -54,6 +54,7 @@ pub struct Call<'a> {
 impl<'a> From<Call<'a>> for PatchWork<'a> {
     fn from(call: Call<'a>) -> PatchWork<'a> {
         PatchWork {
+            last: None,
             options: &call.mender.limits.patch,
             budget: call.budget,
         }

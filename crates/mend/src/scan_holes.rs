@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use crate::VERSION;
 use crate::addition::PatchSource;
 use crate::border;
-use crate::context::HoleContext;
+use crate::context::{HoleContext, Pace};
 use crate::cut::CutScan;
 use crate::digests;
 use crate::error::MendError;
@@ -58,6 +58,13 @@ pub struct FilledScan<'a> {
     pub inpainter: Inpainter<'a>,
     /// Milliseconds of filling them, without preparing them.
     pub fill_ms: f64,
+}
+
+/// What fills holes, and how.
+#[derive(Clone, Copy)]
+struct Filler<'i, 'a> {
+    inpainter: &'i Inpainter<'a>,
+    pace: Pace,
 }
 
 /// The patches of a request, and how long they took.
@@ -246,9 +253,13 @@ impl ScanHoles {
         let (selection, inpainter) = self.chosen(scan, later, call)?;
         let requests = selection.requests.iter();
         let requests: Vec<&HoleRequest> = requests.filter(|it| holes.contains(&it.id)).collect();
+        let filler = Filler {
+            inpainter: &inpainter,
+            pace: Pace::Dragged,
+        };
         let drafts = requests
             .par_iter()
-            .map(|request| self.draft(request, &inpainter, call));
+            .map(|request| self.draft(request, filler, call));
         let mut drafts: Vec<PatchDraft> = drafts.collect::<Result<_, _>>()?;
         separate(&mut drafts, call.budget)?;
         Ok(drafts)
@@ -290,12 +301,16 @@ impl ScanHoles {
     fn draft<'a>(
         &'a self,
         request: &HoleRequest,
-        inpainter: &Inpainter<'a>,
+        filler: Filler<'_, 'a>,
         call: Call<'a>,
     ) -> Result<PatchDraft<'a>, MendError> {
         call.budget.check()?;
         match self.opened(request.id)? {
-            PreparedHole::Charted(hole) => HoleContext::new(hole, inpainter, call)?.fill(request),
+            PreparedHole::Charted(hole) => {
+                let context = HoleContext::new(hole, filler.inpainter, call)?;
+                let pace = filler.pace;
+                HoleContext { pace, ..context }.fill(request)
+            }
             PreparedHole::Fair(hole) => hole.fill(request),
         }
     }
@@ -308,8 +323,12 @@ impl ScanHoles {
     ) -> Result<FilledScan<'a>, MendError> {
         let started = Instant::now();
         let stage = call.budget.begin("filling", selection.requests.len());
+        let filler = Filler {
+            inpainter: &inpainter,
+            pace: Pace::Anew,
+        };
         let drafts = selection.requests.par_iter().map(|request| {
-            let draft = self.draft(request, &inpainter, call)?;
+            let draft = self.draft(request, filler, call)?;
             stage.one_done();
             match draft.reasons_to_leave() {
                 doubts if doubts.is_empty() || selection.accept_doubtful => Ok(draft),

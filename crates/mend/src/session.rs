@@ -379,6 +379,23 @@ mod tests {
             assert_eq!(draft.normals.len(), draft.positions.len());
             assert!(draft.normals.iter().all(|n| n.norm() > 0.0));
         }
+        // Each draft of a drag starts from the one before: near the patches of the same constraints, if not at their bits.
+        let call = session.call(never);
+        for step in 1..=8 {
+            let mut anchor = anchor_at(Some(hole));
+            anchor.position[2] += 0.02 * f64::from(step);
+            let constraints = Constraints {
+                anchors: vec![anchor],
+                ..Constraints::default()
+            };
+            let draft = call.draft(&constraints).unwrap().positions;
+            let (positions, _) = call.positions(&constraints).unwrap();
+            let farthest = (draft.iter().zip(positions.iter().flatten()))
+                .map(|(a, b)| (a - b).norm())
+                .fold(0.0, f64::max);
+            // A tenth of an edge of the sheet, which has 24 squares a side.
+            assert!(farthest < 0.1 / 24.0, "step {step}: {farthest}");
+        }
         let elsewhere = Constraints {
             anchors: vec![anchor_at(Some(77))],
             ..Constraints::default()

@@ -54,7 +54,9 @@ impl FairPatch {
         region: &Region,
         work: impl Into<PatchWork<'a>>,
     ) -> Result<FairPatch, PatchError> {
-        let PatchWork { options, budget } = work.into();
+        let PatchWork {
+            options, budget, ..
+        } = work.into();
         let rim: Vec<u32> = region.rim.iter().rev().copied().collect();
         let mut sheet = spanned(&rim, region, budget)?;
         let edge = median_edge(&region.mesh);

@@ -3,6 +3,7 @@
 //! rest.
 
 use darn_budget::{Budget, Exhausted, Steps};
+use rayon::prelude::*;
 
 use crate::mesh::bounds::Bounds;
 use crate::mesh::intersect::intersections_within;
@@ -56,17 +57,27 @@ fn candidates(mesh: &TriMesh, first: usize, budget: &Budget) -> Result<Vec<(u32,
     let mut held: Vec<FaceBox> = (0..first).filter_map(boxed).filter(near).collect();
     let strips = Strips::new(&own, &held, &all);
     let (own, held) = (strips.cut(&mut own), strips.cut(&mut held));
-    let mut pairs = Vec::new();
-    let mut steps = Steps::of(budget);
-    for (strip, (own, held)) in own.iter().zip(&held).enumerate() {
-        strips.sweep(own, held, &mut steps, |a, b| {
-            if strips.first_of_both(a, b) == strip && !surely_apart(mesh, a.face, b.face) {
-                pairs.push((a.face.min(b.face), a.face.max(b.face)));
-            }
-        })?;
-    }
-    Ok(pairs)
+    // Their number depends on no thread, nor does the work that is counted.
+    let share = own.len().div_ceil(SHARES).max(1);
+    let shares = own.par_chunks(share).zip(held.par_chunks(share));
+    let pairs = shares.enumerate().map(|(place, (own, held))| {
+        let mut pairs = Vec::new();
+        let mut steps = Steps::of(budget);
+        for (strip, (own, held)) in (place * share..).zip(own.iter().zip(held)) {
+            strips.sweep(own, held, &mut steps, |a, b| {
+                if strips.first_of_both(a, b) == strip && !surely_apart(mesh, a.face, b.face) {
+                    pairs.push((a.face.min(b.face), a.face.max(b.face)));
+                }
+            })?;
+        }
+        Ok(pairs)
+    });
+    let pairs: Vec<Vec<(u32, u32)>> = pairs.collect::<Result<_, _>>()?;
+    Ok(pairs.concat())
 }
+
+/// Into how many pieces of work strips are divided, at most.
+const SHARES: usize = 8;
 
 /// Nanoseconds of work a face when its box is made and sorted.
 const BOX_WORK: u64 = 50;

@@ -18,6 +18,7 @@ mod fair;
 mod forces;
 mod harmonic;
 mod intersections;
+mod last_strain;
 mod metric;
 mod plan;
 mod pull;
@@ -33,6 +34,7 @@ mod untangle;
 
 pub use energy::StrainOptions;
 pub use fair::FairPatch;
+pub use last_strain::LastStrain;
 pub use metric::{PatchMetric, log_stretch};
 pub use plan::{PatchMesh, PatchPlan, median_edge, plan, stretch_limit};
 pub use pull::{Firmness, Pull};
@@ -89,6 +91,9 @@ pub struct PatchWork<'a> {
     pub options: &'a PatchOptions,
     /// What it may cost.
     pub budget: &'a Budget<'a>,
+    /// The last patch of the same plan, to start from while something is dragged; what lies across itself is looked for at the end only then. `None`
+    /// starts anew: the same input gives the same bits.
+    pub last: Option<&'a LastStrain>,
 }
 
 impl<'a> From<&'a PatchOptions> for PatchWork<'a> {
@@ -97,6 +102,7 @@ impl<'a> From<&'a PatchOptions> for PatchWork<'a> {
         PatchWork {
             options,
             budget: Budget::unlimited(),
+            last: None,
         }
     }
 }

@@ -103,7 +103,9 @@ impl PatchMesh {
         chart: &Chart,
         work: PatchWork,
     ) -> Result<PatchMesh, PatchError> {
-        let PatchWork { options, budget } = work;
+        let PatchWork {
+            options, budget, ..
+        } = work;
         let flat: Vec<Vec2> = rim.iter().map(|v| chart.flat[*v as usize]).collect();
         let asked = Asked {
             spacing: spacing(region, chart),
@@ -134,7 +136,9 @@ impl PatchMesh {
         metric: Option<&PatchMetric>,
         work: impl Into<PatchWork<'a>>,
     ) -> Result<PatchPlan, PatchError> {
-        let PatchWork { options, budget } = work.into();
+        let PatchWork {
+            options, budget, ..
+        } = work.into();
         let PatchMesh {
             rim,
             triangulation,
@@ -264,7 +268,11 @@ impl PatchPlan {
         pulls: &[Pull],
         work: impl Into<PatchWork<'a>>,
     ) -> Result<Patch, PatchError> {
-        let PatchWork { options, budget } = work.into();
+        let PatchWork {
+            options,
+            budget,
+            last,
+        } = work.into();
         let strain = &options.strain;
         let refactored;
         let energy = if self.energy.fits(strain) {
@@ -274,8 +282,11 @@ impl PatchPlan {
                 .map_err(PatchError::of_stage("strain"))?;
             &refactored
         };
-        let mut positions = self.join.with_inner(self.initial(chart, filled)?);
-        let target = energy.target_near(&positions, strain);
+        let initial = self.join.with_inner(self.initial(chart, filled)?);
+        let target = energy.target_near(&initial, strain);
+        let mut positions = last
+            .and_then(|last| last.at_rest(&initial))
+            .unwrap_or_else(|| initial.clone());
         let minimisation = Minimisation {
             energy,
             target: &target,
@@ -284,6 +295,9 @@ impl PatchPlan {
             budget,
         };
         let rounds = minimisation.run(&mut positions);
+        if let Some(last) = last {
+            last.keep_rest(initial, &positions);
+        }
         let mut patch = Patch {
             rim: self.rim.clone(),
             flat: self.triangulation.points.clone(),
@@ -294,7 +308,9 @@ impl PatchPlan {
             crossings: 0,
         };
         self.shift(&mut patch.positions, 1.0);
-        self.collisions.separate(&mut patch, budget)?;
+        if last.is_none() || pulls.is_empty() {
+            self.collisions.separate(&mut patch, budget)?;
+        }
         if pulls.is_empty() {
             return Ok(patch);
         }
@@ -303,7 +319,13 @@ impl PatchPlan {
         let mut positions = self.join.with_inner(unshifted.split_off(self.rim.len()));
         let forces = self.forces(pulls, chart, &positions, budget)?;
         if !forces.is_empty() {
-            let rounds = self.apply_forces(&minimisation, &mut positions, &forces);
+            let at_rest = last.map(|last| (last, positions.clone()));
+            let places: Vec<Vec2> = pulls.iter().map(|pull| pull.at).collect();
+            let near = last.and_then(|last| last.pulled(&places, &positions));
+            let rounds = self.apply_forces(&minimisation, &mut positions, &forces, near);
+            if let Some((last, at_rest)) = at_rest {
+                last.keep_pulled(places, at_rest, &positions);
+            }
             patch.strain_rounds += rounds.map_err(PatchError::of_stage("strain"))?;
             patch.positions = self.with_rim(&positions);
             self.shift(&mut patch.positions, 1.0);

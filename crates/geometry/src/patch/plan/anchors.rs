@@ -35,12 +35,13 @@ pub fn stretch_limit(before: f64) -> f64 {
 
 impl PatchPlan {
     /// Moves the free vertices of a patch at rest, which a minimisation without forces left at `positions`, so that the
-    /// forces meet their targets, as far as the stretch limit allows; returns the rounds of strain limiting.
+    /// forces meet their targets, as far as the stretch limit allows; returns the rounds of strain limiting. They start `near` where that is known.
     pub(super) fn apply_forces(
         &self,
         at_rest: &Minimisation,
         positions: &mut [Vec3],
         forces: &[AnchorForce],
+        near: Option<Vec<Vec3>>,
     ) -> Result<usize, SolveError> {
         let Minimisation {
             energy,
@@ -55,7 +56,10 @@ impl PatchPlan {
         let before = self.stretch(&start);
         let limit = stretch_limit(before);
         let target = energy.target_at(positions);
-        self.lift(positions, forces, budget)?;
+        match near {
+            Some(near) => positions.copy_from_slice(&near),
+            None => self.lift(positions, forces, budget)?,
+        }
         // Later rounds still move vertices, but by less than is visible.
         let options = StrainOptions {
             max_rounds: ROUNDS.min(options.max_rounds),
