@@ -131,7 +131,7 @@ def main(binary):
         }.items():
             found = {key: told[name].get(key) for key in expected}
             check(f"a receiver that answers with {name}: {expected}", found == expected, told[name])
-        check("redirects are not followed", [it[0] for it in sinks["302"].received] == ["/hook?token=t0k3n"])
+        check("redirects are not followed", {it[0] for it in sinks["302"].received} == {"/hook?token=t0k3n"})
 
         messages = [it for sink in sinks.values() for it in sink.received]
         verified, strange = 0, 0

@@ -133,7 +133,7 @@ async fn a_scan_is_the_same_however_it_comes() {
         .header("content-digest", digest(&gzip));
     let several = || {
         let texture = Part::bytes(vec![1, 2, 3]);
-        form(scan.clone()).part("images/cloth.png", texture)
+        form(scan.clone()).part("cloth.png", texture)
     };
     let asked_at_once = service.post("/inpaint").multipart(several()).send().await;
     let mended_at_once = asked_at_once.unwrap().bytes().await.unwrap();

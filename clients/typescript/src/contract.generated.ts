@@ -462,7 +462,28 @@ export interface paths {
         trace?: never;
     };
 }
-export type webhooks = Record<string, never>;
+export interface webhooks {
+    jobEnded: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * A job has ended
+         * @description Sent to the webhook of a job when it is done, has failed or is cancelled, and again later until an answer has a status of 200 to 299: ten times in some three days. 410 ends that for this job. Redirects are not followed. An event may come twice, and events of a job that was retried in another order; its `version` tells
+         */
+        post: operations["jobEnded"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+}
 export interface components {
     schemas: {
         /** @description What is wanted beside a scan's boundary loops. */
@@ -995,7 +1016,7 @@ export interface components {
             priority?: number;
             /** @description Where it is in its life. */
             state?: components["schemas"]["JobState"];
-            /** @description What is done now: `waiting`, `reading`, `mending` or `writing`; empty once it is finished. */
+            /** @description What is done now: `waiting`; `reading`, `welding`, `flattening`, `filling`, `texturing` and `writing` the scan; `storing` the result; empty once it is finished. */
             stage?: string;
             /** @description Starts at 1 and grows with every change; the `id` of its events. */
             version?: number;
@@ -1036,6 +1057,69 @@ export interface components {
             outcome?: string;
             /** @description Why it failed. */
             problem?: components["schemas"]["JobProblem"];
+            /** @description Holes that the present stage works on, where it goes hole by hole. */
+            holes?: number;
+            /** @description How many of them are done in this stage. */
+            holesDone?: number;
+            /** @description How far its webhook has been told of its end; left out for a job without one. */
+            webhook?: components["schemas"]["JobWebhook"];
+        };
+        /** @description The webhook of a job. */
+        JobWebhook: {
+            /** @description Where the end of the job is told, without the query of the URL. */
+            url?: string;
+            /** @description Whether it has been told. */
+            state?: components["schemas"]["WebhookState"];
+            /** @description Tries that have begun. */
+            tries?: number;
+            /** @description The status of the receiver's last answer; left out where it gave none. */
+            lastStatus?: number;
+            /** @description Why the last try failed, for a person; left out where it did not. */
+            lastError?: string;
+            /**
+             * Format: date-time
+             * @description When the last try ended.
+             */
+            lastTryAt?: string;
+            /**
+             * Format: date-time
+             * @description When the next try is due.
+             */
+            nextTryAt?: string;
+        };
+        /** @description What a webhook is told when a job ends: the body of the request, signed as the Standard Webhooks specification has it. */
+        WebhookEvent: {
+            /** @description `job.done`, `job.error` or `job.cancelled`. */
+            type?: string;
+            /**
+             * Format: date-time
+             * @description When the job ended.
+             */
+            timestamp?: string;
+            /** @description The job. */
+            data?: components["schemas"]["EndedJob"];
+        };
+        /** @description A job as a webhook is told of it: enough to fetch the rest. */
+        EndedJob: {
+            /** @description Names it in paths. */
+            id?: string;
+            /** @description The client's name for it. */
+            name?: string;
+            /** @description How it ended. */
+            state?: components["schemas"]["JobState"];
+            /** @description Its version at its end; a job that is retried ends again, with a higher one. */
+            version?: number;
+            /** @description Where the rest is. */
+            links?: components["schemas"]["JobLinks"];
+        };
+        /** @description Paths of the service. */
+        JobLinks: {
+            /** @description The job. */
+            job?: string;
+            /** @description The mended scan, where there is one. */
+            result?: string;
+            /** @description Its report, where there is one. */
+            report?: string;
         };
         /** @description Why a job failed: what the problem document of the synchronous request says. */
         JobProblem: {
@@ -1072,6 +1156,11 @@ export interface components {
          * @enum {string}
          */
         JobState: "JOB_STATE_UNSPECIFIED" | "WAITING" | "RUNNING" | "DONE" | "ERROR" | "CANCELLED";
+        /**
+         * @description Whether a webhook has been told of a job's end.
+         * @enum {string}
+         */
+        WebhookState: "WEBHOOK_STATE_UNSPECIFIED" | "PENDING" | "DELIVERED" | "GIVEN_UP" | "DISABLED";
         /** @description A problem document (RFC 9457) */
         Problem: {
             /** @constant */
@@ -1095,7 +1184,7 @@ export interface components {
          * @description The words of this version; later ones may have more
          * @enum {string}
          */
-        ProblemCode: "empty_body" | "malformed_request" | "digest_mismatch" | "no_query" | "not_found" | "method_not_allowed" | "body_timeout" | "body_too_large" | "message_too_large" | "constraints_too_large" | "query_too_large" | "unsupported_content_encoding" | "unsupported_media_type" | "invalid_constraints" | "invalid_query" | "key_missing" | "key_unknown" | "key_expired" | "insufficient_scope" | "quota_exceeded" | "session_not_found" | "session_expired" | "session_evicted" | "session_deleted" | "session_too_large" | "session_busy" | "sessions_full" | "jobs_not_kept" | "no_such_job" | "job_unfinished" | "job_wrong_state" | "job_expired" | "idempotency_mismatch" | "job_crashed_worker" | "storage_full" | "internal" | "queue_full" | "memory_full" | "uploads_full" | "draining" | "warming_up" | "deadline_exceeded" | "not_a_gltf" | "invalid_gltf" | "invalid_mesh_file" | "scan_too_large" | "index_out_of_range" | "position_not_finite" | "unsupported_extension" | "external_data" | "no_triangles" | "singular_transform" | "constraints_do_not_fit" | "anchor_out_of_reach" | "too_much_work" | "too_much_memory" | "answer_too_large" | "no_holes" | "nothing_to_strip" | "too_many_holes" | "non_manifold_rim" | "coordinates_too_large" | "not_a_disk" | "not_cloth_like" | "too_little_known" | "rim_crosses_itself" | "patch_degenerate" | "no_plausible_fill" | "hole_too_narrow";
+        ProblemCode: "empty_body" | "malformed_request" | "digest_mismatch" | "no_query" | "not_found" | "method_not_allowed" | "body_timeout" | "body_too_large" | "message_too_large" | "constraints_too_large" | "query_too_large" | "unsupported_content_encoding" | "unsupported_media_type" | "invalid_constraints" | "invalid_query" | "key_missing" | "key_unknown" | "key_expired" | "insufficient_scope" | "quota_exceeded" | "session_not_found" | "session_expired" | "session_evicted" | "session_deleted" | "session_lost" | "session_elsewhere" | "session_too_large" | "session_busy" | "sessions_full" | "jobs_not_kept" | "no_such_job" | "job_unfinished" | "job_wrong_state" | "job_expired" | "idempotency_mismatch" | "webhooks_off" | "job_crashed_worker" | "storage_full" | "internal" | "queue_full" | "memory_full" | "uploads_full" | "draining" | "no_workers" | "warming_up" | "deadline_exceeded" | "not_a_gltf" | "invalid_gltf" | "invalid_mesh_file" | "scan_too_large" | "index_out_of_range" | "position_not_finite" | "unsupported_extension" | "external_data" | "no_triangles" | "singular_transform" | "constraints_do_not_fit" | "anchor_out_of_reach" | "too_much_work" | "too_much_memory" | "answer_too_large" | "no_holes" | "nothing_to_strip" | "too_many_holes" | "non_manifold_rim" | "coordinates_too_large" | "not_a_disk" | "not_cloth_like" | "too_little_known" | "rim_crosses_itself" | "patch_degenerate" | "no_plausible_fill" | "hole_too_narrow";
         /** @description The version, and the limits that a client can check before it sends a scan */
         Info: {
             /** @description darn's version */
@@ -1899,7 +1988,10 @@ export interface operations {
     };
     inpaintSession: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description While something is dragged: the patches at once, not measured, without a report; `GET /sessions/{id}/result` does not take note of it */
+                draft?: boolean;
+            };
             header?: never;
             path: {
                 id: string;
@@ -1914,7 +2006,7 @@ export interface operations {
             };
         };
         responses: {
-            /** @description The patches alone: as a GLB, or as positions on the session's topology: patch after patch, in order of hole id, x, y, z of every vertex as little-endian 32-bit floats, in the order of `patchUvs`. With `Accept: multipart/mixed`: the part `report` (application/json, schema Report), then the part `patches` */
+            /** @description The patches alone: as a GLB, or as positions on the session's topology: patch after patch, in order of hole id, x, y, z of every vertex as little-endian 32-bit floats, in the order of `patchUvs`. With `draft=true`: those positions of the session's holes, then the normals of all vertices in the same order, and neither report nor headers of one. With `Accept: multipart/mixed`: the part `report` (application/json, schema Report), then the part `patches` */
             200: {
                 headers: {
                     /** @description Holes filled */
@@ -2303,6 +2395,8 @@ export interface operations {
                 name?: string;
                 /** @description Of a client's jobs those with a higher priority start first */
                 priority?: number;
+                /** @description Where the end of the job is told, by a request as `webhooks` of this document describes it: an https URL of a public address */
+                webhook?: string;
             };
             header?: {
                 /** @description A repeated request with the same key and payload is answered with the first one's job; keys of different client addresses are apart */
@@ -2385,7 +2479,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Constraints that are valid with no scan; `errors` names them. With code `idempotency_mismatch`: the key came before with another payload. What is wrong with the scan itself becomes the job's `problem` */
+            /** @description Constraints that are valid with no scan; `errors` names them. With code `idempotency_mismatch`: the key came before with another payload; with code `webhooks_off`: the service has no secret to sign webhooks with. What is wrong with the scan itself becomes the job's `problem` */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -2770,6 +2864,42 @@ export interface operations {
             401: components["responses"]["KeyRefused"];
             403: components["responses"]["ScopeMissing"];
             429: components["responses"]["QuotaExceeded"];
+        };
+    };
+    jobEnded: {
+        parameters: {
+            query?: never;
+            header: {
+                /** @description The same in all tries of this event, and in no other one */
+                "webhook-id": string;
+                /** @description When this try was made, in seconds since 1970 */
+                "webhook-timestamp": string;
+                /** @description `v1,` and the base64 of the HMAC-SHA256 of id, timestamp and body with full stops between (https://www.standardwebhooks.com); of several secrets several, with a space between */
+                "webhook-signature": string;
+            };
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["WebhookEvent"];
+            };
+        };
+        responses: {
+            /** @description Nothing more is to be told of this job */
+            410: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Taken */
+            "2XX": {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
         };
     };
 }
