@@ -3,7 +3,7 @@ import type { AnchorFound, AnchorQuery, Constraints, Report, Session, SessionHol
 import { Latest } from './latest.js';
 import { ProblemError } from './problem.js';
 import type { Progress } from './requests.js';
-import type { Service } from './service.js';
+import type { MapEvents, Service } from './service.js';
 
 /** The new cloth of a hole at one moment. */
 export interface HolePositions {
@@ -56,6 +56,11 @@ export class ClothSession {
     return this.opened.skipped ?? [];
   }
 
+  /** The middle of every triangle that was cut out, `x, y, z` of each. */
+  get cutFaces(): readonly number[] {
+    return this.opened.cutFaces ?? [];
+  }
+
   /**
    * Shows the cloth under constraints while a hand drags. One request is in flight; of those that come meanwhile the newest waits, so that
    * every answer is used.
@@ -105,6 +110,11 @@ export class ClothSession {
   /** Where on a hole's chart a point in space belongs. */
   optimizeAnchor(query: AnchorQuery, progress: Progress = {}): Promise<AnchorFound> {
     return this.within(progress, (id) => this.service.optimizeAnchor(id, query, progress));
+  }
+
+  /** The same, and the loss of every cell as it is computed, until the signal is aborted. A drag goes first. */
+  anchorMap(query: AnchorQuery, events: MapEvents, progress: Progress = {}): Promise<void> {
+    return this.within(progress, (id) => this.service.anchorMap(id, query, events, progress));
   }
 
   /** The whole scan under constraints. */

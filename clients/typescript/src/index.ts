@@ -5,4 +5,4 @@ export { Latest } from './latest.js';
 export { type Part, partsOf } from './multipart.js';
 export { ProblemError, describeError, isAbort, problemOf } from './problem.js';
 export { type Answer, type Progress } from './requests.js';
-export { type MendedPositions, type ServiceOptions, Service } from './service.js';
+export { type MapEvents, type MendedPositions, type ServiceOptions, Service } from './service.js';

@@ -36,12 +36,37 @@ export function upload(form: Upload, progress: Progress = {}): Promise<Answer> {
 /** Sends a request by `fetch`. Waits and tries again on 503. */
 export function send(url: URL, init: RequestInit, progress: Progress = {}): Promise<Answer> {
   return patiently(progress, async () => {
-    const response = await fetch(url, { ...init, signal: progress.signal ?? null });
-    if (!response.ok) {
-      throw problemOf(response.status, response.headers.get('retry-after'), await response.text());
-    }
+    const response = await fetched(url, init, progress);
     return { contentType: response.headers.get('content-type') ?? '', body: await response.arrayBuffer() };
   });
+}
+
+/**
+ * Sends a request whose answer is JSON messages, one a line, that come while they are made, and hands each on. Aborting the signal ends the answer.
+ * Waits and tries again on 503.
+ */
+export async function sendForLines<T>(
+  url: URL,
+  init: RequestInit,
+  onLine: (line: T) => void,
+  progress: Progress = {},
+): Promise<void> {
+  const response = await patiently(progress, () => fetched(url, init, progress));
+  const reader = response.body?.getReader();
+  const decoder = new TextDecoder();
+  let rest = '';
+  for (;;) {
+    const { done, value } = (await reader?.read()) ?? { done: true, value: undefined };
+    rest += decoder.decode(value, { stream: !done });
+    const lines = rest.split('\n');
+    rest = done ? '' : (lines.pop() ?? '');
+    for (const line of lines.filter((it) => it !== '')) {
+      onLine(JSON.parse(line) as T);
+    }
+    if (done) {
+      return;
+    }
+  }
 }
 
 /** The answer's body as JSON. */
@@ -49,7 +74,15 @@ export function jsonOf<T>(answer: Answer): T {
   return JSON.parse(new TextDecoder().decode(answer.body)) as T;
 }
 
-async function patiently(progress: Progress, attempt: () => Promise<Answer>): Promise<Answer> {
+async function fetched(url: URL, init: RequestInit, { signal }: Progress): Promise<Response> {
+  const response = await fetch(url, { ...init, signal: signal ?? null });
+  if (!response.ok) {
+    throw problemOf(response.status, response.headers.get('retry-after'), await response.text());
+  }
+  return response;
+}
+
+async function patiently<T>(progress: Progress, attempt: () => Promise<T>): Promise<T> {
   for (let tries = 1; ; tries += 1) {
     try {
       return await attempt();

@@ -1,13 +1,31 @@
 /** The service's requests that the editor makes, as functions of a typed client. */
-import type { AnchorFound, AnchorQuery, Constraints, HolesReport, Info, Report, Session } from './contract.js';
+import type {
+  AnchorFound,
+  AnchorLine,
+  AnchorQuery,
+  Constraints,
+  HolesReport,
+  Info,
+  MapPiece,
+  Report,
+  Session,
+} from './contract.js';
 import { partsOf } from './multipart.js';
 import { ProblemError } from './problem.js';
-import { type Answer, type Progress, jsonOf, send, upload } from './requests.js';
+import { type Answer, type Progress, jsonOf, send, sendForLines, upload } from './requests.js';
 
 /** Patches as positions: `x, y, z` of every patch vertex, hole after hole, in order of id. */
 export interface MendedPositions {
   readonly positions: Float32Array;
   readonly report: Report;
+}
+
+/** What a map is told of as it is computed. */
+export interface MapEvents {
+  /** Where the point belongs; before the map. */
+  onFound(found: AnchorFound): void;
+  /** The next cells. */
+  onMap(piece: MapPiece): void;
 }
 
 /** What a service takes of its clients. */
@@ -79,6 +97,30 @@ export class Service {
     return jsonOf(await this.send(`sessions/${session}/optimize-anchor`, jsonBody(query), progress));
   }
 
+  /**
+   * The same search, and the loss of every cell of the hole as it is computed. The service lets edits of the session go first; aborting the signal ends
+   * the map.
+   */
+  async anchorMap(session: string, query: AnchorQuery, events: MapEvents, progress: Progress): Promise<void> {
+    const url = this.at(`sessions/${session}/optimize-anchor`);
+    const request = jsonBody({ ...query, map: true });
+    const onLine = ({ found, map, problem }: AnchorLine): void => {
+      if (problem !== undefined) {
+        throw new ProblemError(problem.status ?? 500, problem.code ?? '', problem.detail ?? '', undefined);
+      }
+      if (found !== undefined) {
+        events.onFound(found);
+      }
+      if (map !== undefined) {
+        events.onMap(map);
+      }
+    };
+    await this.withKey((key) => {
+      const headers = { ...request.headers, ...authorization(key), accept: 'application/x-ndjson' };
+      return sendForLines(url, { ...request, headers }, onLine, progress);
+    });
+  }
+
   /** The whole scan, mended as the session was asked last. */
   async result(session: string, progress: Progress): Promise<Blob> {
     const answer = await this.send(`sessions/${session}/result`, {}, progress);
@@ -109,7 +151,7 @@ export class Service {
   }
 
   /** Sends a request with the key, and again with another one as long as there is somebody who knows one. */
-  private async withKey(attempt: (key: string | undefined) => Promise<Answer>): Promise<Answer> {
+  private async withKey<T>(attempt: (key: string | undefined) => Promise<T>): Promise<T> {
     for (;;) {
       const sent = this.key;
       try {
