@@ -30,7 +30,7 @@ await page.getByRole('heading', { name: 'Tools' }).scrollIntoViewIfNeeded();
 await page.mouse.move(from.x, from.y);
 await page.mouse.down();
 await page.keyboard.down('Shift');
-const answered = page.waitForResponse((answer) => answer.url().endsWith('/inpaint'));
+const answered = page.waitForResponse((answer) => answer.url().includes('/inpaint'));
 await page.mouse.move(from.x + 10, from.y - 15);
 await answered;
 await page.mouse.move(from.x + 40, from.y - 60);

@@ -276,7 +276,7 @@ inEditor(
     const before = await editor.picture();
 
     let [inFlight, most, sent] = [0, 0, 0];
-    await page.route('**/inpaint', async (route) => {
+    await page.route('**/inpaint*', async (route) => {
       inFlight += 1;
       sent += 1;
       most = Math.max(most, inFlight);

@@ -11,6 +11,8 @@ export interface HolePositions {
   readonly hole: SessionHole;
   /** `x, y, z` of every patch vertex, scene units; the rim's come first. */
   readonly positions: Float32Array;
+  /** Unit normals of the vertices in the same order, those at the rim as the scan's; only while it is dragged. */
+  readonly normals?: Float32Array;
 }
 
 /** What a drag is told. */
@@ -68,7 +70,7 @@ export class ClothSession {
   drag(constraints: Constraints, { onPatches, onError }: DragEvents): void {
     this.live.offer(async () => {
       try {
-        onPatches(await this.positions(constraints));
+        onPatches(await this.draft(constraints));
       } catch (error) {
         onError(error);
       }
@@ -84,7 +86,20 @@ export class ClothSession {
     return this.mend(constraints, progress);
   }
 
-  /** The new cloth under constraints, as fast as the service can: without a report. */
+  /** The new cloth under constraints while it is dragged, as fast as the service can; `result` takes no note of it. */
+  draft(constraints: Constraints, progress: Progress = {}): Promise<HolePositions[]> {
+    return this.within(progress, async (id) => {
+      const both = await this.service.draft(id, constraints, progress);
+      const half = both.length / 2;
+      const normals = this.byHole(both.subarray(half));
+      return this.byHole(both.subarray(0, half)).map((patch, at) => ({
+        ...patch,
+        normals: (normals[at] as HolePositions).positions,
+      }));
+    });
+  }
+
+  /** The new cloth under constraints, without a report. */
   positions(constraints: Constraints, progress: Progress = {}): Promise<HolePositions[]> {
     return this.within(progress, async (id) => {
       const positions = await this.service.positions(id, constraints, progress);

@@ -1040,7 +1040,7 @@ export interface components {
             priority?: number;
             /** @description Where it is in its life. */
             state?: components["schemas"]["JobState"];
-            /** @description What is done now: `waiting`, `reading`, `mending` or `writing`; empty once it is finished. */
+            /** @description What is done now: `waiting`; `reading`, `welding`, `flattening`, `filling`, `texturing` and `writing` the scan; `storing` the result; empty once it is finished. */
             stage?: string;
             /** @description Starts at 1 and grows with every change; the `id` of its events. */
             version?: number;
@@ -1081,6 +1081,10 @@ export interface components {
             outcome?: string;
             /** @description Why it failed. */
             problem?: components["schemas"]["JobProblem"];
+            /** @description Holes that the present stage works on, where it goes hole by hole. */
+            holes?: number;
+            /** @description How many of them are done in this stage. */
+            holesDone?: number;
         };
         /** @description Why a job failed: what the problem document of the synchronous request says. */
         JobProblem: {
@@ -1140,7 +1144,7 @@ export interface components {
          * @description The words of this version; later ones may have more
          * @enum {string}
          */
-        ProblemCode: "empty_body" | "malformed_request" | "digest_mismatch" | "no_query" | "not_found" | "method_not_allowed" | "body_timeout" | "body_too_large" | "message_too_large" | "constraints_too_large" | "query_too_large" | "unsupported_content_encoding" | "unsupported_media_type" | "invalid_constraints" | "invalid_query" | "key_missing" | "key_unknown" | "key_expired" | "insufficient_scope" | "quota_exceeded" | "session_not_found" | "session_expired" | "session_evicted" | "session_deleted" | "session_too_large" | "session_busy" | "sessions_full" | "jobs_not_kept" | "no_such_job" | "job_unfinished" | "job_wrong_state" | "job_expired" | "idempotency_mismatch" | "job_crashed_worker" | "storage_full" | "internal" | "queue_full" | "memory_full" | "uploads_full" | "draining" | "warming_up" | "deadline_exceeded" | "not_a_gltf" | "invalid_gltf" | "invalid_mesh_file" | "scan_too_large" | "index_out_of_range" | "position_not_finite" | "unsupported_extension" | "external_data" | "no_triangles" | "singular_transform" | "constraints_do_not_fit" | "anchor_out_of_reach" | "too_much_work" | "too_much_memory" | "answer_too_large" | "no_holes" | "nothing_to_strip" | "too_many_holes" | "non_manifold_rim" | "coordinates_too_large" | "not_a_disk" | "not_cloth_like" | "too_little_known" | "rim_crosses_itself" | "patch_degenerate" | "no_plausible_fill" | "hole_too_narrow";
+        ProblemCode: "empty_body" | "malformed_request" | "digest_mismatch" | "no_query" | "not_found" | "method_not_allowed" | "body_timeout" | "body_too_large" | "message_too_large" | "constraints_too_large" | "query_too_large" | "unsupported_content_encoding" | "unsupported_media_type" | "invalid_constraints" | "invalid_query" | "key_missing" | "key_unknown" | "key_expired" | "insufficient_scope" | "quota_exceeded" | "session_not_found" | "session_expired" | "session_evicted" | "session_deleted" | "session_lost" | "session_elsewhere" | "session_too_large" | "session_busy" | "sessions_full" | "jobs_not_kept" | "no_such_job" | "job_unfinished" | "job_wrong_state" | "job_expired" | "idempotency_mismatch" | "job_crashed_worker" | "storage_full" | "internal" | "queue_full" | "memory_full" | "uploads_full" | "draining" | "no_workers" | "warming_up" | "deadline_exceeded" | "not_a_gltf" | "invalid_gltf" | "invalid_mesh_file" | "scan_too_large" | "index_out_of_range" | "position_not_finite" | "unsupported_extension" | "external_data" | "no_triangles" | "singular_transform" | "constraints_do_not_fit" | "anchor_out_of_reach" | "too_much_work" | "too_much_memory" | "answer_too_large" | "no_holes" | "nothing_to_strip" | "too_many_holes" | "non_manifold_rim" | "coordinates_too_large" | "not_a_disk" | "not_cloth_like" | "too_little_known" | "rim_crosses_itself" | "patch_degenerate" | "no_plausible_fill" | "hole_too_narrow";
         /** @description The version, and the limits that a client can check before it sends a scan */
         Info: {
             /** @description darn's version */
@@ -1944,7 +1948,10 @@ export interface operations {
     };
     inpaintSession: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description While something is dragged: the patches at once, not measured, without a report; `GET /sessions/{id}/result` does not take note of it */
+                draft?: boolean;
+            };
             header?: never;
             path: {
                 id: string;
@@ -1959,7 +1966,7 @@ export interface operations {
             };
         };
         responses: {
-            /** @description The patches alone: as a GLB, or as positions on the session's topology: patch after patch, in order of hole id, x, y, z of every vertex as little-endian 32-bit floats, in the order of `patchUvs`. With `Accept: multipart/mixed`: the part `report` (application/json, schema Report), then the part `patches` */
+            /** @description The patches alone: as a GLB, or as positions on the session's topology: patch after patch, in order of hole id, x, y, z of every vertex as little-endian 32-bit floats, in the order of `patchUvs`. With `draft=true`: those positions of the session's holes, then the normals of all vertices in the same order, and neither report nor headers of one. With `Accept: multipart/mixed`: the part `report` (application/json, schema Report), then the part `patches` */
             200: {
                 headers: {
                     /** @description Holes filled */

@@ -79,6 +79,12 @@ export class Service {
     return new Float32Array(answer.body);
   }
 
+  /** The patches as a drag shows them: the positions of all vertices, hole after hole in order of id, then their unit normals in the same order. */
+  async draft(session: string, constraints: Constraints, progress: Progress): Promise<Float32Array> {
+    const answer = await this.send(`sessions/${session}/inpaint?draft=true`, jsonBody(constraints), progress);
+    return new Float32Array(answer.body);
+  }
+
   /** The patches' positions under constraints, and the report. */
   async mend(session: string, constraints: Constraints, progress: Progress): Promise<MendedPositions> {
     const accept = 'multipart/mixed, application/octet-stream;q=0.9';

@@ -76,7 +76,7 @@ export class ScanSession {
   /** The patches under constraints, as fast as the service can. */
   async preview(choice: Choice, constraints: Constraints): Promise<Patch[]> {
     const opened = await this.open(choice, {});
-    return dressed(await opened.cloth.positions(constraints), opened);
+    return dressed(await opened.cloth.draft(constraints), opened);
   }
 
   /** Where on a hole's chart a point belongs. */

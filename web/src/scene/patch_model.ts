@@ -102,7 +102,7 @@ export class PatchModel {
       geometry.getAttribute('position'),
       geometry.getAttribute('normal'),
     ] as BufferAttribute[];
-    const normals = vertexNormals(patch.positions, patch.hole.patchFaces ?? []);
+    const normals = patch.normals ?? vertexNormals(patch.positions, patch.hole.patchFaces ?? []);
     for (const [corner, vertex] of this.corners.entries()) {
       const side = this.sides[corner] as number;
       for (let axis = 0; axis < 3; axis += 1) {
