@@ -76,6 +76,9 @@ async fn a_preflight_has_an_id_and_is_counted() {
     let answer = preflight.send().await.unwrap();
     assert_eq!(answer.status(), 200);
     assert_eq!(answer.headers()["x-request-id"], "test");
+    assert_eq!(answer.headers()["access-control-max-age"], "7200");
+    let methods = answer.headers()["access-control-allow-methods"].clone();
+    assert_eq!(methods, "GET,POST,DELETE");
     let count = "darn_requests_total{route=\"/inpaint\",status=\"200\"}";
     assert_eq!(service.metric(count).await, Some(1.0));
 

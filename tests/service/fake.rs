@@ -12,7 +12,8 @@ use std::{
 use axum::body::Bytes;
 use darn_budget::Budget;
 use darn_contract::port::{
-    EditSession, HolesQuery, Mended, Mender, PatchForm, Patches, Refusal, ScanForm, Stripped,
+    EditSession, HolesQuery, MapSpan, Mended, Mender, PatchForm, Patches, Refusal, ScanForm,
+    Stripped,
 };
 use darn_contract::{Anchor, Code, Constraints, FieldError, Search, codes, v1};
 use serde_json::{Value, json};
@@ -187,6 +188,10 @@ struct FakeState {
     /// Behaviours of the next edits, then of every later one.
     next_edits: VecDeque<Behaviour>,
     every_edit: Option<Behaviour>,
+    /// Pieces of maps that reached a worker.
+    map_pieces: usize,
+    /// Behaviours of the next pieces.
+    next_pieces: VecDeque<Behaviour>,
     released: bool,
 }
 
@@ -205,6 +210,16 @@ impl FakeMender {
     /// Sets the behaviour of every edit that has none of its own.
     pub fn every_edit(&self, behaviour: Behaviour) {
         self.lock().every_edit = Some(behaviour);
+    }
+
+    /// Sets the behaviour of the next piece of a map that has none yet.
+    pub fn next_piece(&self, behaviour: Behaviour) {
+        self.lock().next_pieces.push_back(behaviour);
+    }
+
+    /// Pieces of maps that reached a worker.
+    pub fn map_pieces(&self) -> usize {
+        self.lock().map_pieces
     }
 
     /// Blocks until the scan of this name has reached a worker.
@@ -267,6 +282,14 @@ impl FakeMender {
         self.act(behaviour)
     }
 
+    fn act_on_piece(&self) -> Result<(), Refusal> {
+        let mut state = self.lock();
+        state.map_pieces += 1;
+        let next = state.next_pieces.pop_front();
+        drop(state);
+        self.act(next.unwrap_or(Behaviour::TakeTime))
+    }
+
     fn act(&self, behaviour: Behaviour) -> Result<(), Refusal> {
         self.0.changed.notify_all();
         match behaviour {
@@ -317,6 +340,9 @@ fn found(search: &Search) -> v1::AnchorFound {
         ..Default::default()
     }
 }
+
+/// Cells of a map.
+pub const MAP_CELLS: usize = 1000;
 
 /// A session; counts itself in [`FakeMender::kept`].
 struct FakeSession {
@@ -391,6 +417,23 @@ impl EditSession for FakeSession {
 
     fn optimize_anchor(&self, search: &Search, _: &Budget<'_>) -> Result<v1::AnchorFound, Refusal> {
         Ok(found(search))
+    }
+
+    /// A map of [`MAP_CELLS`] cells; the loss of each is its index.
+    fn map_piece(
+        &self,
+        _: &Search,
+        span: MapSpan,
+        _: &Budget<'_>,
+    ) -> Result<v1::MapPiece, Refusal> {
+        self.fake.act_on_piece()?;
+        let cells = (span.first..MAP_CELLS).take(span.count);
+        Ok(v1::MapPiece {
+            cells: cells.clone().map(|k| k as u32).collect(),
+            losses: cells.map(|k| k as f64).collect(),
+            gradients: Vec::new(),
+            total: MAP_CELLS as u32,
+        })
     }
 }
 

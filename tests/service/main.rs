@@ -1,5 +1,6 @@
 //! The service with its real router on a real socket, around a fake mender that behaves as each test says.
 
+mod anchor_maps;
 mod anchors;
 mod cached;
 mod digests;

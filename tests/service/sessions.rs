@@ -104,6 +104,16 @@ async fn a_session_is_opened_edited_and_ended() {
     let edited = service.get(&result).send().await.unwrap();
     assert_eq!(edited.text().await.unwrap(), "glTF cloth []");
 
+    let described: Value = (service.get(&path).send().await.unwrap().json().await).unwrap();
+    assert_eq!(described["constraints"]["anchors"], json!([]));
+    service.ask(&edit, edit_at(0.75)).send().await.unwrap();
+    let described: Value = (service.get(&path).send().await.unwrap().json().await).unwrap();
+    let met: Value = serde_json::from_str(&edit_at(0.75)).unwrap();
+    assert_eq!(
+        described["constraints"]["anchors"][0]["position"][0],
+        met["anchors"][0]["position"][0]
+    );
+
     let search = format!("{path}/optimize-anchor");
     let found = service.ask(&search, r#"{"target": [0.25, 0, 0]}"#);
     let found: Value = found.send().await.unwrap().json().await.unwrap();

@@ -1,5 +1,5 @@
 /** Everything that the editor uses of its libraries, in one place: `build.mjs` makes a file of its own of it. */
-export { LitElement, css, html, nothing, svg } from 'lit';
+export { LitElement, css, html, nothing, svg, unsafeCSS } from 'lit';
 export type { ReactiveController, TemplateResult } from 'lit';
 export { MeshBVH, acceleratedRaycast } from 'three-mesh-bvh';
 export {

@@ -101,7 +101,7 @@ test('the example with plain three.js mends and pulls', { timeout: 3 * PATIENCE 
   const picture = () => page.locator('canvas').screenshot();
   const before = await picture();
   const answers = [];
-  page.on('response', (response) => response.url().endsWith('/inpaint') && answers.push(response.status()));
+  page.on('response', (response) => response.url().includes('/inpaint') && answers.push(response.status()));
   for (const value of ['0.2', '0.5', '0.9']) {
     await page.locator('#pull').fill(value);
   }

@@ -76,3 +76,8 @@ export function sheetWithThreeHoles() {
   };
   return sheetGlb(60, (i, j) => holes.some(([x, y]) => inHole(i - x, j - y)));
 }
+
+/** A sheet of 40 squares with a bite in the middle of one side, eight wide and six deep. */
+export function sheetWithBite() {
+  return sheetGlb(40, (i, j) => (i - 19.5) ** 2 / 16 + j ** 2 / 36 < 1);
+}

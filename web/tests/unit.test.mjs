@@ -7,7 +7,7 @@ import { load } from './sources.mjs';
 const { Latest, Service, partsOf, problemOf } = await load('client.ts');
 const { History } = await load('model/history.ts');
 const { boundaryLines, linesOfLoops } = await load('scene/boundary.ts');
-const { readConstraints, onHoles, selectionOf, statelessMessageOf } = await load('model/constraints.ts');
+const { readConstraints, carried, selectionOf, statelessMessageOf } = await load('model/constraints.ts');
 const { locate, positionOf, normalOf } = await load('model/cloth.ts');
 const { scanOf } = await load('model/scan_files.ts');
 
@@ -132,24 +132,49 @@ test('constraints come back as they were written, and others are refused with wh
     anchors: [{ hole: 1, position: [0, 0, 0] }],
     edits: [{ hole: 2, grab: { uv: [0.5, 0.5], offset: [0, 1, 0] } }],
   };
-  const text = JSON.stringify(statelessMessageOf({ holes: [1, 2], acceptDoubtful: false }, constraints));
-  assert.deepEqual(readConstraints(text), { holes: [1, 2], acceptDoubtful: false, constraints });
-  assert.deepEqual(onHoles(constraints, new Set([2])), { anchors: [], edits: constraints.edits });
+  const made = [{ cut: { center: [0, 0, 0], radius: 1 } }, { border: { auto: true } }];
+  const loops = [{ id: 1 }, { id: 2 }];
+  // Hole 3 is that of the cut.
+  const choice = { holes: [1, 2, 3], made, acceptDoubtful: false };
+  const text = JSON.stringify(statelessMessageOf(loops, choice, constraints));
+  assert.deepEqual(readConstraints(text), { holes: [1, 2], made, acceptDoubtful: false, constraints });
+  assert.deepEqual(readConstraints('{"holes": [{"border": "auto"}]}').made, [made[1]]);
   for (const bad of ['', '[]', '{"cut": 1}', '{"holes": [{"near": [0, 0, 0]}]}', '{"edits": [1]}']) {
     assert.throws(() => readConstraints(bad), bad);
   }
 });
 
+test('constraints go with the hole that has the same rim, whatever its number', () => {
+  const hole = (id, ...rimPositions) => ({ id, rimPositions });
+  const before = [hole(1, 0, 0, 0), hole(2, 1, 1, 1), hole(3, 2, 2, 2)];
+  const after = [hole(1, 0, 0, 0), hole(4, 1, 1, 1), hole(3, 9, 9, 9)];
+  const anchors = [1, 2, 3].map((id) => ({ hole: id, position: [0, 0, id] }));
+  const edits = [{ grab: { uv: [0, 0], offset: [0, 0, 0] } }];
+  assert.deepEqual(carried({ anchors, edits }, before, after), {
+    anchors: [anchors[0], { ...anchors[1], hole: 4 }],
+    edits,
+  });
+});
+
 test('holes are chosen by leaving others out, other loops by name', () => {
   const kinds = ['OUTER_BOUNDARY', 'HOLE', 'HOLE', 'OPENING'];
   const loops = kinds.map((kind, id) => ({ id, kind }));
-  const choice = (...ids) => selectionOf(loops, { holes: ids, acceptDoubtful: false });
+  const choice = (...ids) => selectionOf(loops, { holes: ids, made: [], acceptDoubtful: false });
   assert.deepEqual(choice(1, 2), {});
   assert.deepEqual(choice(2), { except: [1] });
   assert.deepEqual(choice(1, 2, 3), { holes: [{ id: 3 }], fill: 'holes' });
   assert.deepEqual(choice(1, 3), { holes: [{ id: 3 }], fill: 'holes', except: [2] });
   assert.deepEqual(choice(3), { holes: [{ id: 3 }], except: [1, 2] });
-  assert.deepEqual(selectionOf(loops, { holes: [1, 2], acceptDoubtful: true }), { acceptDoubtful: true });
+  const cut = { cut: { center: [0, 0, 0], radius: 1 } };
+  assert.deepEqual(selectionOf(loops, { holes: [1, 2, 7], made: [cut], acceptDoubtful: true }), {
+    holes: [cut],
+    fill: 'holes',
+    acceptDoubtful: true,
+  });
+  assert.deepEqual(selectionOf(loops, { holes: [], made: [cut], acceptDoubtful: false }), {
+    holes: [cut],
+    except: [1, 2],
+  });
 });
 
 test('a place on cloth keeps its uv and follows the positions', () => {
@@ -239,4 +264,34 @@ test('without a key, or with a wrong one and nobody to ask, a request is refused
     assert.deepEqual(seen, [undefined, 'Bearer wrong', undefined]);
     await new Service(SOMEWHERE, { key: 'right' }).info();
   });
+});
+
+test('lines of an answer are handed on as they come, however they are cut', async () => {
+  const real = globalThis.fetch;
+  const text = '{"found":{"uv":[0.5,0.5]}}\n{"map":{"cells":[1],"losses":[2],"total":2}}\n';
+  const bytes = new TextEncoder().encode(text);
+  const answer = (...tail) =>
+    new ReadableStream({
+      start(controller) {
+        for (let at = 0; at < bytes.length; at += 7) {
+          controller.enqueue(bytes.slice(at, at + 7));
+        }
+        tail.forEach((line) => controller.enqueue(new TextEncoder().encode(line)));
+        controller.close();
+      },
+    });
+  const told = [];
+  const events = { onFound: (found) => told.push(found), onMap: (piece) => told.push(piece) };
+  try {
+    globalThis.fetch = async (_, { headers }) => {
+      assert.equal(headers.accept, 'application/x-ndjson');
+      return new Response(answer());
+    };
+    await new Service(SOMEWHERE).anchorMap('1', { target: [0, 0, 0] }, events, {});
+    assert.deepEqual(told, [{ uv: [0.5, 0.5] }, { cells: [1], losses: [2], total: 2 }]);
+    globalThis.fetch = async () => new Response(answer('{"problem":{"status":422,"code":"bad","detail":"no"}}'));
+    await assert.rejects(new Service(SOMEWHERE).anchorMap('1', { target: [0, 0, 0] }, events, {}), { code: 'bad' });
+  } finally {
+    globalThis.fetch = real;
+  }
 });

@@ -3,7 +3,7 @@ import type { AnchorFound, AnchorQuery, Constraints, Report, Session, SessionHol
 import { Latest } from './latest.js';
 import { ProblemError } from './problem.js';
 import type { Progress } from './requests.js';
-import type { Service } from './service.js';
+import type { MapEvents, Service } from './service.js';
 
 /** The new cloth of a hole at one moment. */
 export interface HolePositions {
@@ -11,6 +11,8 @@ export interface HolePositions {
   readonly hole: SessionHole;
   /** `x, y, z` of every patch vertex, scene units; the rim's come first. */
   readonly positions: Float32Array;
+  /** Unit normals of the vertices in the same order, those at the rim as the scan's; only while it is dragged. */
+  readonly normals?: Float32Array;
 }
 
 /** What a drag is told. */
@@ -56,6 +58,11 @@ export class ClothSession {
     return this.opened.skipped ?? [];
   }
 
+  /** The middle of every triangle that was cut out, `x, y, z` of each. */
+  get cutFaces(): readonly number[] {
+    return this.opened.cutFaces ?? [];
+  }
+
   /**
    * Shows the cloth under constraints while a hand drags. One request is in flight; of those that come meanwhile the newest waits, so that
    * every answer is used.
@@ -63,7 +70,7 @@ export class ClothSession {
   drag(constraints: Constraints, { onPatches, onError }: DragEvents): void {
     this.live.offer(async () => {
       try {
-        onPatches(await this.positions(constraints));
+        onPatches(await this.draft(constraints));
       } catch (error) {
         onError(error);
       }
@@ -79,7 +86,20 @@ export class ClothSession {
     return this.mend(constraints, progress);
   }
 
-  /** The new cloth under constraints, as fast as the service can: without a report. */
+  /** The new cloth under constraints while it is dragged, as fast as the service can; `result` takes no note of it. */
+  draft(constraints: Constraints, progress: Progress = {}): Promise<HolePositions[]> {
+    return this.within(progress, async (id) => {
+      const both = await this.service.draft(id, constraints, progress);
+      const half = both.length / 2;
+      const normals = this.byHole(both.subarray(half));
+      return this.byHole(both.subarray(0, half)).map((patch, at) => ({
+        ...patch,
+        normals: (normals[at] as HolePositions).positions,
+      }));
+    });
+  }
+
+  /** The new cloth under constraints, without a report. */
   positions(constraints: Constraints, progress: Progress = {}): Promise<HolePositions[]> {
     return this.within(progress, async (id) => {
       const positions = await this.service.positions(id, constraints, progress);
@@ -105,6 +125,11 @@ export class ClothSession {
   /** Where on a hole's chart a point in space belongs. */
   optimizeAnchor(query: AnchorQuery, progress: Progress = {}): Promise<AnchorFound> {
     return this.within(progress, (id) => this.service.optimizeAnchor(id, query, progress));
+  }
+
+  /** The same, and the loss of every cell as it is computed, until the signal is aborted. A drag goes first. */
+  anchorMap(query: AnchorQuery, events: MapEvents, progress: Progress = {}): Promise<void> {
+    return this.within(progress, (id) => this.service.anchorMap(id, query, events, progress));
   }
 
   /** The whole scan under constraints. */

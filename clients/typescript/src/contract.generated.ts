@@ -640,6 +640,26 @@ export interface components {
             /** @description The map as a PNG, the path drawn on it; only when the query asked for the map. */
             mapPng?: string;
         };
+        /** @description A line of a search's answer whose map comes as it is computed (`Accept: application/x-ndjson`): first where the point belongs, then the pieces of the map. */
+        AnchorLine: {
+            /** @description Where the point belongs, without the map; the first line. */
+            found?: components["schemas"]["AnchorFound"];
+            /** @description The next cells of the map. */
+            map?: components["schemas"]["MapPiece"];
+            /** @description Why the map ends before it is whole; the last line then. */
+            problem?: components["schemas"]["JobProblem"];
+        };
+        /** @description Some cells of the map of an anchor search. Cells far from each other come first, so that the whole of the map is seen early. */
+        MapPiece: {
+            /** @description The cells, by index `64 j + i`. */
+            cells?: number[];
+            /** @description The loss of each. */
+            losses?: number[];
+            /** @description Its gradient, `du, dv` of each, per cell width; only when the query asked for it. */
+            gradients?: number[];
+            /** @description Cells that the whole map has. */
+            total?: number;
+        };
         /** @description One step of an anchor search. */
         SearchStep: {
             /** @description The grid's cell, `[i, j]`. */
@@ -937,6 +957,10 @@ export interface components {
             bytes?: string;
             /** @description What a person should know about this scan. */
             notes?: string[];
+            /** @description The middle of every triangle that was cut out, `x, y, z` of each, in the scene's space. */
+            cutFaces?: number[];
+            /** @description The anchors and edits that the session met last; those of which `GET /sessions/{id}/result` makes the whole scan. */
+            constraints?: components["schemas"]["Constraints"];
         };
         /** @description A hole of a session: what stays the same whatever the constraints, and the cloth as it is without any. Of a hole without a chart the uvs, the grid and the picture are empty. */
         SessionHole: {
@@ -958,6 +982,25 @@ export interface components {
             chartPng?: string;
             /** @description What was done to fill it without constraints. */
             report?: components["schemas"]["HoleReport"];
+            /** @description The cells whose positions the scan gives, by index `64 j + i`. */
+            knownCells?: number[];
+            /** @description Side of the chart's unit square, in the scene's unit: what uvs are multiplied by for lengths on the chart. 0 without a chart. */
+            chartSide?: number;
+            /** @description How the scan's own look goes on in the patch. */
+            surface?: components["schemas"]["PatchSurface"];
+        };
+        /** @description A patch as a surface to draw: the scan's texture coordinates and colours continued into it. Where the whole scan gets patches with images of their own, their texture coordinates are those of the patches as a GLB. */
+        PatchSurface: {
+            /** @description Of each corner of the surface the vertex of the patch; a vertex on a texture seam has several corners. */
+            vertices?: number[];
+            /** @description Triangles: three corners each. */
+            faces?: number[];
+            /** @description Texture coordinates of the first set, `s, t` of each corner; empty where the scan has none. */
+            texcoords?: number[];
+            /** @description Colours of the first set, linear `r, g, b, a` of each corner; empty where the scan has none. */
+            colors?: number[];
+            /** @description Index of its material among those of the glTF; left out where the scan has none there. */
+            material?: number;
         };
         /** @description A loop left as it was. */
         Skipped: {
@@ -971,6 +1014,8 @@ export interface components {
             reason?: string;
             /** @description The patch that was made and not applied, of a loop skipped as `no_plausible_fill`. */
             patch?: components["schemas"]["PatchReport"];
+            /** @description Positions of its vertices in the scene's space, `x, y, z` of each in order around the loop; only in the description of a session. */
+            rimPositions?: number[];
         };
         /** @description Milliseconds spent on a whole scan. */
         ScanTimings: {
@@ -1297,6 +1342,10 @@ export interface operations {
                     "darn-result"?: string;
                     /** @description SHA-256 and SHA-512 of the answer's body (RFC 9530). `Content-Digest` or `Repr-Digest` of a request are checked */
                     "repr-digest"?: string;
+                    /** @description The body's SHA-256; absent with multipart/mixed */
+                    etag?: string;
+                    /** @description Whether the answer was kept from an identical request (RFC 9211); only where the service keeps some */
+                    "cache-status"?: string;
                     /** @description Boundary loops left as they were */
                     "darn-loops-skipped"?: number;
                     /** @description Largest distance between the cloth and an anchor, those of gestures included, in the scene's unit; absent when there are none */
@@ -1888,8 +1937,17 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The session is gone: `session_expired`, `session_evicted` or `session_deleted` */
+            /** @description The session is gone: `session_expired`, `session_evicted`, `session_deleted` or `session_lost` */
             410: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Another process keeps the session (`session_elsewhere`), or this one has no workers (`no_workers`) */
+            421: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -1965,7 +2023,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The session is gone: `session_expired`, `session_evicted` or `session_deleted` */
+            /** @description The session is gone: `session_expired`, `session_evicted`, `session_deleted` or `session_lost` */
             410: {
                 headers: {
                     [name: string]: unknown;
@@ -2015,6 +2073,10 @@ export interface operations {
                     "darn-result"?: string;
                     /** @description SHA-256 and SHA-512 of the answer's body (RFC 9530). `Content-Digest` or `Repr-Digest` of a request are checked */
                     "repr-digest"?: string;
+                    /** @description The body's SHA-256; absent with multipart/mixed */
+                    etag?: string;
+                    /** @description Whether the answer was kept from an identical request (RFC 9211); only where the service keeps some */
+                    "cache-status"?: string;
                     /** @description Boundary loops left as they were */
                     "darn-loops-skipped"?: number;
                     /** @description Largest distance between the cloth and an anchor, those of gestures included, in the scene's unit; absent when there are none */
@@ -2059,7 +2121,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The session is gone: `session_expired`, `session_evicted` or `session_deleted` */
+            /** @description The session is gone: `session_expired`, `session_evicted`, `session_deleted` or `session_lost` */
             410: {
                 headers: {
                     [name: string]: unknown;
@@ -2079,6 +2141,15 @@ export interface operations {
             };
             /** @description A content type or a content encoding that is not read here */
             415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Another process keeps the session (`session_elsewhere`), or this one has no workers (`no_workers`) */
+            421: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -2142,13 +2213,14 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Where the point belongs. In `map` and `mapGradient`, null stands for a cell outside the hole */
+            /** @description Where the point belongs. In `map` and `mapGradient`, null stands for a cell outside the hole. With `Accept: application/x-ndjson` the map comes as it is computed, one message a line; it waits while the session is edited, and ends when the request is closed */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content: {
                     "application/json": components["schemas"]["AnchorFound"];
+                    "application/x-ndjson": components["schemas"]["AnchorLine"];
                 };
             };
             /** @description Not readable: an empty or broken body, one that is not what its digest says, not a glTF, no query where one is needed, what is asked not JSON */
@@ -2180,7 +2252,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The session is gone: `session_expired`, `session_evicted` or `session_deleted` */
+            /** @description The session is gone: `session_expired`, `session_evicted`, `session_deleted` or `session_lost` */
             410: {
                 headers: {
                     [name: string]: unknown;
@@ -2200,6 +2272,15 @@ export interface operations {
             };
             /** @description A content type or a content encoding that is not read here */
             415: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Another process keeps the session (`session_elsewhere`), or this one has no workers (`no_workers`) */
+            421: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -2266,6 +2347,10 @@ export interface operations {
                     "darn-result"?: string;
                     /** @description SHA-256 and SHA-512 of the answer's body (RFC 9530). `Content-Digest` or `Repr-Digest` of a request are checked */
                     "repr-digest"?: string;
+                    /** @description The body's SHA-256; absent with multipart/mixed */
+                    etag?: string;
+                    /** @description Whether the answer was kept from an identical request (RFC 9211); only where the service keeps some */
+                    "cache-status"?: string;
                     /** @description Boundary loops left as they were */
                     "darn-loops-skipped"?: number;
                     /** @description Largest distance between the cloth and an anchor, those of gestures included, in the scene's unit; absent when there are none */
@@ -2292,8 +2377,17 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The session is gone: `session_expired`, `session_evicted` or `session_deleted` */
+            /** @description The session is gone: `session_expired`, `session_evicted`, `session_deleted` or `session_lost` */
             410: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Another process keeps the session (`session_elsewhere`), or this one has no workers (`no_workers`) */
+            421: {
                 headers: {
                     [name: string]: unknown;
                 };
@@ -2604,6 +2698,10 @@ export interface operations {
                     "darn-result"?: string;
                     /** @description SHA-256 and SHA-512 of the answer's body (RFC 9530). `Content-Digest` or `Repr-Digest` of a request are checked */
                     "repr-digest"?: string;
+                    /** @description The body's SHA-256; absent with multipart/mixed */
+                    etag?: string;
+                    /** @description Whether the answer was kept from an identical request (RFC 9211); only where the service keeps some */
+                    "cache-status"?: string;
                     /** @description Boundary loops left as they were */
                     "darn-loops-skipped"?: number;
                     /** @description Largest distance between the cloth and an anchor, those of gestures included, in the scene's unit; absent when there are none */

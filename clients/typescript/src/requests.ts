@@ -56,12 +56,31 @@ export async function opened(url: URL, init: RequestInit): Promise<Response> {
   return response;
 }
 
+/** Hands on the messages of an answer that is JSON, one a line, as they come. */
+export async function linesOf<T>(response: Response, onLine: (line: T) => void): Promise<void> {
+  const reader = response.body?.getReader();
+  const decoder = new TextDecoder();
+  let rest = '';
+  for (;;) {
+    const { done, value } = (await reader?.read()) ?? { done: true, value: undefined };
+    rest += decoder.decode(value, { stream: !done });
+    const lines = rest.split('\n');
+    rest = done ? '' : (lines.pop() ?? '');
+    for (const line of lines.filter((it) => it !== '')) {
+      onLine(JSON.parse(line) as T);
+    }
+    if (done) {
+      return;
+    }
+  }
+}
+
 /** The answer's body as JSON. */
 export function jsonOf<T>(answer: Answer): T {
   return JSON.parse(new TextDecoder().decode(answer.body)) as T;
 }
 
-async function patiently(progress: Progress, attempt: () => Promise<Answer>): Promise<Answer> {
+export async function patiently<T>(progress: Progress, attempt: () => Promise<T>): Promise<T> {
   for (let tries = 1; ; tries += 1) {
     try {
       return await attempt();

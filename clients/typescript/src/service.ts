@@ -1,14 +1,33 @@
 /** The service's requests that the editor makes, as functions of a typed client. */
-import type { AnchorFound, AnchorQuery, Constraints, HolesReport, Info, Report, Session } from './contract.js';
+import type {
+  AnchorFound,
+  AnchorLine,
+  AnchorQuery,
+  Constraints,
+  HolesReport,
+  Info,
+  MapPiece,
+  Report,
+  Session,
+} from './contract.js';
 import { Jobs } from './jobs.js';
 import { partsOf } from './multipart.js';
-import { type Answer, type Progress, jsonOf } from './requests.js';
+import { ProblemError } from './problem.js';
+import { type Answer, type Progress, jsonOf, linesOf } from './requests.js';
 import { type ServiceOptions, Transport, jsonBody } from './transport.js';
 
 /** Patches as positions: `x, y, z` of every patch vertex, hole after hole, in order of id. */
 export interface MendedPositions {
   readonly positions: Float32Array;
   readonly report: Report;
+}
+
+/** What a map is told of as it is computed. */
+export interface MapEvents {
+  /** Where the point belongs; before the map. */
+  onFound(found: AnchorFound): void;
+  /** The next cells. */
+  onMap(piece: MapPiece): void;
 }
 
 /** A client of the service at one address. */
@@ -52,6 +71,12 @@ export class Service {
     return new Float32Array(answer.body);
   }
 
+  /** The patches as a drag shows them: the positions of all vertices, hole after hole in order of id, then their unit normals in the same order. */
+  async draft(session: string, constraints: Constraints, progress: Progress): Promise<Float32Array> {
+    const answer = await this.transport.send(`sessions/${session}/inpaint?draft=true`, jsonBody(constraints), progress);
+    return new Float32Array(answer.body);
+  }
+
   /** The patches' positions under constraints, and the report. */
   async mend(session: string, constraints: Constraints, progress: Progress): Promise<MendedPositions> {
     const accept = 'multipart/mixed, application/octet-stream;q=0.9';
@@ -68,6 +93,28 @@ export class Service {
   /** Where on a hole's chart a point in space belongs. */
   async optimizeAnchor(session: string, query: AnchorQuery, progress: Progress): Promise<AnchorFound> {
     return jsonOf(await this.transport.send(`sessions/${session}/optimize-anchor`, jsonBody(query), progress));
+  }
+
+  /**
+   * The same search, and the loss of every cell of the hole as it is computed. The service lets edits of the session go first; aborting the signal ends
+   * the map.
+   */
+  async anchorMap(session: string, query: AnchorQuery, events: MapEvents, progress: Progress): Promise<void> {
+    const request = jsonBody({ ...query, map: true });
+    request.headers = { ...request.headers, accept: 'application/x-ndjson' };
+    request.signal = progress.signal ?? null;
+    const onLine = ({ found, map, problem }: AnchorLine): void => {
+      if (problem !== undefined) {
+        throw new ProblemError(problem.status ?? 500, problem.code ?? '', problem.detail ?? '', undefined);
+      }
+      if (found !== undefined) {
+        events.onFound(found);
+      }
+      if (map !== undefined) {
+        events.onMap(map);
+      }
+    };
+    await linesOf(await this.transport.openPatiently(`sessions/${session}/optimize-anchor`, request, progress), onLine);
   }
 
   /** The whole scan, mended as the session was asked last. */

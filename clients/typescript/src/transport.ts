@@ -1,6 +1,6 @@
 /** Requests to one service with the key that it takes, which somebody may be asked for. */
 import { ProblemError } from './problem.js';
-import { type Answer, type Progress, opened, send, upload } from './requests.js';
+import { type Answer, type Progress, opened, patiently, send, upload } from './requests.js';
 
 /** What a service takes of its clients. */
 export interface ServiceOptions {
@@ -44,6 +44,11 @@ export class Transport {
   /** Sends a request; the answer is read as it comes. */
   open(path: string, request: Request): Promise<Response> {
     return this.withKey((key) => opened(this.at(path), withKey(request, key)));
+  }
+
+  /** The same; waits and tries again on 503. */
+  openPatiently(path: string, request: Request, progress: Progress): Promise<Response> {
+    return patiently(progress, () => this.open(path, request));
   }
 
   /** Sends a form. */

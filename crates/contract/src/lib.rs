@@ -6,6 +6,7 @@
 pub mod codes;
 mod error_chain;
 mod json;
+mod message;
 mod outcome;
 pub mod port;
 mod validate;

@@ -165,6 +165,26 @@ pub trait EditSession: Send + Sync + 'static {
         search: &Search,
         budget: &Budget<'_>,
     ) -> Result<v1::AnchorFound, Refusal>;
+
+    /// Some cells of the map of that search, so that a map can be had in pieces with other calls between them.
+    ///
+    /// # Errors
+    /// As [`EditSession::optimize_anchor`].
+    fn map_piece(
+        &self,
+        search: &Search,
+        span: MapSpan,
+        budget: &Budget<'_>,
+    ) -> Result<v1::MapPiece, Refusal>;
+}
+
+/// Which cells of a map are wanted, in the order in which pieces have them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MapSpan {
+    /// Cells that earlier pieces had.
+    pub first: usize,
+    /// Most cells of this piece.
+    pub count: usize,
 }
 
 /// The form of a scan that came as a zip with a glTF and its files.

@@ -8,6 +8,7 @@ use super::v1;
 
 mod selector;
 
+pub(super) use selector::list;
 pub use selector::{Border, Cut, HoleSelector};
 
 /// Most entries of one list of constraints: far above any use, and cheap to check.

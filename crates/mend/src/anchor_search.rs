@@ -1,5 +1,6 @@
 //! The anchor search on a hole: the network's loss at each cell, the start, and the answer in the contract's words.
 
+use std::cmp::Reverse;
 use std::time::Instant;
 
 use crate::context::HoleContext;
@@ -11,6 +12,7 @@ use crate::error::MendError;
 use crate::inpainter::Inpainter;
 use crate::timings::milliseconds;
 use darn_budget::Budget;
+use darn_contract::port::MapSpan;
 use darn_contract::{FieldError, Search, v1};
 use darn_geometry::grid::{CELLS, SIDE, cell_centre};
 use darn_geometry::mesh::{Vec2, Vec3};
@@ -120,6 +122,36 @@ impl HoleContext<'_> {
         }
         answer.milliseconds = milliseconds(started);
         Ok(answer)
+    }
+
+    /// Some of the hole's cells with the losses of a search's target, and gradients where the search asks for them. Cells far from each other
+    /// come first: those on every 32nd row and column, then on every 16th, and so on.
+    ///
+    /// # Errors
+    /// A failure of the network; `Exhausted`.
+    pub fn map_piece(&self, search: &Search, span: MapSpan) -> Result<v1::MapPiece, MendError> {
+        let losses = AnchorLosses::new(self, Vec3::from(search.target))?;
+        let mut cells = self.hole.cells.indices().to_vec();
+        let total = cells.len() as u32;
+        let spread = |k: &usize| ((k % SIDE) | (k / SIDE)).trailing_zeros();
+        cells.sort_by_key(|k| (Reverse(spread(k)), *k));
+        let piece: Vec<usize> = (cells.into_iter().skip(span.first))
+            .take(span.count)
+            .collect();
+        let (mut values, mut gradients) = (Vec::new(), Vec::new());
+        if search.map_gradient {
+            let found = losses.gradients(&piece)?;
+            values.extend(found.iter().map(|at| at.loss));
+            gradients.extend(found.iter().flat_map(|at| <[f64; 2]>::from(at.gradient)));
+        } else {
+            values = losses.losses(&piece)?;
+        }
+        Ok(v1::MapPiece {
+            cells: piece.iter().map(|k| *k as u32).collect(),
+            losses: values,
+            gradients,
+            total,
+        })
     }
 
     fn no_cells(&self) -> MendError {

@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use darn_budget::Budget;
 use darn_contract::port::{
-    EditSession, HolesQuery, Mended, Mender, PatchForm, Patches, Refusal, ScanForm, Stripped,
+    EditSession, HolesQuery, MapSpan, Mended, Mender, PatchForm, Patches, Refusal, ScanForm,
+    Stripped,
 };
 use darn_contract::{Constraints, Search, error_chain, v1};
 use darn_geometry::mesh::Vec3;
@@ -192,6 +193,16 @@ impl EditSession for ScanSession {
     ) -> Result<v1::AnchorFound, Refusal> {
         let found = (self.pools()).run(budget, || self.call(budget).optimize_anchor(search));
         found.map_err(refusal)
+    }
+
+    fn map_piece(
+        &self,
+        search: &Search,
+        span: MapSpan,
+        budget: &Budget<'_>,
+    ) -> Result<v1::MapPiece, Refusal> {
+        let piece = (self.pools()).run(budget, || self.call(budget).map_piece(search, span));
+        piece.map_err(refusal)
     }
 }
 

@@ -19,6 +19,7 @@ use crate::inpainter::Inpainter;
 use crate::mender::{Call, NetworkMender};
 use crate::prepared_hole::PreparedHole;
 use crate::scan_notes;
+use crate::scan_search::searched_hole;
 use crate::select::{HoleRequest, Selection};
 use crate::separate::separate;
 use crate::sorted::{Sorted, sorted};
@@ -138,7 +139,7 @@ impl ScanHoles {
     }
 
     /// The scan without what the request cut out.
-    fn seen<'a>(&'a self, scan: &'a Scan) -> &'a Scan {
+    pub fn seen<'a>(&'a self, scan: &'a Scan) -> &'a Scan {
         self.cut.as_ref().unwrap_or(scan)
     }
 
@@ -447,7 +448,8 @@ impl ScanHoles {
         })
     }
 
-    fn patch_source<'a>(
+    /// Where the patches get their attributes from.
+    pub fn patch_source<'a>(
         &'a self,
         scan: &'a Scan,
         filled: &'a FilledScan<'a>,
@@ -485,34 +487,13 @@ impl ScanHoles {
         }
     }
 
-    /// Searches where on a hole's grid a point in space belongs.
-    ///
-    /// # Errors
-    /// At `/hole` and `/start` when they do not fit; a failure of the network; `Exhausted`.
-    pub fn search(&self, search: &Search, call: Call) -> Result<v1::AnchorFound, MendError> {
-        let id = searched_hole(search, self.holes.iter().map(PreparedHole::id))?;
-        let Some(hole) = self.hole(id) else {
-            let detail = format!("hole {id} was not chosen when the scan was opened");
-            let wrong = FieldError::new("/hole", detail);
-            return Err(MendError::Constraints(vec![wrong]));
-        };
-        let hole = match hole {
-            PreparedHole::Charted(hole) => hole,
-            PreparedHole::Fair(hole) => {
-                return Err(MendError::Constraints(vec![hole.no_chart("/hole")]));
-            }
-        };
-        let inpainter = self.inpainter(call.mender)?;
-        let context = HoleContext::new(hole, &inpainter, call)?;
-        context.search(search)
-    }
-
     /// What fills the holes unless a later request says otherwise.
-    fn inpainter<'a>(&self, mender: &'a NetworkMender) -> Result<Inpainter<'a>, MendError> {
+    pub fn inpainter<'a>(&self, mender: &'a NetworkMender) -> Result<Inpainter<'a>, MendError> {
         Inpainter::choose(&mender.networks, self.weights.as_deref(), self.up)
     }
 
-    fn hole(&self, id: u32) -> Option<&PreparedHole> {
+    /// A prepared hole.
+    pub fn hole(&self, id: u32) -> Option<&PreparedHole> {
         self.holes.iter().find(|h| h.id() == id)
     }
 
@@ -525,17 +506,5 @@ impl ScanHoles {
             );
             MendError::Constraints(vec![FieldError::new("/holes", detail)])
         })
-    }
-}
-
-/// The hole that a search names, or the only one of `ids`.
-fn searched_hole(search: &Search, mut ids: impl Iterator<Item = u32>) -> Result<u32, MendError> {
-    match (search.hole, ids.next(), ids.count()) {
-        (Some(id), ..) | (None, Some(id), 0) => Ok(id),
-        (None, _, more) => {
-            let detail = format!("the scan has {} holes; say which one is meant", more + 1);
-            let wrong = FieldError::new("/hole", detail);
-            Err(MendError::Constraints(vec![wrong]))
-        }
     }
 }

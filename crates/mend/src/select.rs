@@ -260,7 +260,7 @@ impl SkipReason {
             kind: kind(rim.kind) as i32,
             code: self.code.to_owned(),
             reason: self.phrase,
-            patch: None,
+            ..v1::Skipped::default()
         }
     }
 }
@@ -339,6 +339,7 @@ pub fn skipped_for(error: &MendError, rim: &BoundaryLoop) -> v1::Skipped {
         code: error.code().word.to_owned(),
         reason: error_chain(error),
         patch,
+        ..v1::Skipped::default()
     }
 }
 

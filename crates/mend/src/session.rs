@@ -7,15 +7,14 @@ use rayon::prelude::*;
 use crate::addition::vertex_normals_at_seam;
 use crate::call_pools::CallPools;
 use crate::error::MendError;
-use crate::hole_report::FilledHole;
 use crate::mender::{Call, NetworkMender};
-use crate::picture;
 use crate::prepared_hole::PreparedHole;
 use crate::scan_holes::{FilledScan, ScanHoles};
+use crate::session_description;
 use darn_budget::Budget;
-use darn_contract::port::Mended;
+use darn_contract::port::{MapSpan, Mended};
 use darn_contract::{Constraints, FieldError, Search, v1};
-use darn_geometry::mesh::{Vec2, Vec3};
+use darn_geometry::mesh::Vec3;
 use darn_gltf_scan::export::{NewMesh, TexturedMesh, textured_meshes};
 use darn_gltf_scan::{PatchPoint, PatchPrimitive, Scan};
 
@@ -57,7 +56,7 @@ impl ScanSession {
             budget,
         };
         let holes = ScanHoles::open(&scan, constraints, call)?;
-        let described = described(&holes, &scan, call)?;
+        let described = session_description::described(&holes, &scan, call)?;
         Ok(ScanSession {
             scan,
             holes,
@@ -78,7 +77,7 @@ impl ScanSession {
     /// factors fill in. Measured: a thousand sessions counted at 4.2 MiB each took 6.0 MiB each.
     pub fn bytes(&self) -> usize {
         let holes: usize = self.holes.holes.iter().map(PreparedHole::bytes).sum();
-        let described: usize = self.described.holes.iter().map(hole_bytes).sum();
+        let described = session_description::bytes(&self.described);
         let counted = self.scan.bytes_held() + self.holes.bytes() + holes + described;
         counted + counted / 2
     }
@@ -123,7 +122,7 @@ impl ScanSession {
 pub struct SessionDraft {
     /// The vertices of all patches, patch after patch, in order of hole id; scene space.
     pub positions: Vec<Vec3>,
-    /// Their normals, of any length above 0. At a seam they are those of patch and scan together.
+    /// Their unit normals. At a seam they are those of patch and scan together.
     pub normals: Vec<Vec3>,
 }
 
@@ -204,7 +203,7 @@ impl<'a> SessionCall<'a> {
             positions: (drafts.into_iter())
                 .flat_map(|draft| draft.patch.positions)
                 .collect(),
-            normals: normals.into_iter().flatten().collect(),
+            normals: normals.concat().iter().map(Vec3::normalize).collect(),
         })
     }
 
@@ -216,67 +215,17 @@ impl<'a> SessionCall<'a> {
         self.session.holes.search(search, self.call)
     }
 
+    /// Some cells of the map of a search: see [`map_piece`](crate::context::HoleContext::map_piece).
+    ///
+    /// # Errors
+    /// As [`SessionCall::optimize_anchor`].
+    pub fn map_piece(&self, search: &Search, span: MapSpan) -> Result<v1::MapPiece, MendError> {
+        self.session.holes.map_piece(search, span, self.call)
+    }
+
     fn filled(&self, constraints: &Constraints) -> Result<FilledScan<'a>, MendError> {
         (self.session.holes).filled_with(&self.session.scan, constraints, self.call)
     }
-}
-
-/// What stays the same during a session, and the cloth without constraints.
-fn described(opened: &ScanHoles, scan: &Scan, call: Call) -> Result<v1::Session, MendError> {
-    let filled = opened.filled(call)?;
-    let mut holes = Vec::new();
-    for FilledHole {
-        hole,
-        patch,
-        report,
-    } in &filled.holes
-    {
-        let rim = patch.rim.len();
-        let every = v1::SessionHole {
-            id: hole.id(),
-            rim_positions: flat(&patch.positions[..rim]),
-            patch_faces: patch.faces.iter().flatten().copied().collect(),
-            report: Some(report.clone()),
-            ..v1::SessionHole::default()
-        };
-        let Some(hole) = hole.charted() else {
-            holes.push(every);
-            continue;
-        };
-        let unedited = hole.unedited(&filled.inpainter, call)?;
-        let uv = |p: &Vec2| <[f64; 2]>::from(hole.chart.frame.uv(*p));
-        let png = picture::chart_png(hole, patch).map_err(MendError::Picture)?;
-        holes.push(v1::SessionHole {
-            rim_uvs: patch.flat[..rim].iter().flat_map(uv).collect(),
-            grid_positions: flat(&unedited.filled),
-            hole_cells: hole.cells.indices().iter().map(|k| *k as u32).collect(),
-            patch_uvs: patch.flat.iter().flat_map(uv).collect(),
-            chart_png: png.into(),
-            ..every
-        });
-    }
-    let report = opened.report(scan, filled);
-    Ok(v1::Session {
-        holes,
-        skipped: report.skipped,
-        weights: report.weights,
-        notes: report.notes,
-        ..Default::default()
-    })
-}
-
-/// `x, y, z` of each point, one after another.
-fn flat(points: &[Vec3]) -> Vec<f64> {
-    points.iter().flat_map(|p| [p.x, p.y, p.z]).collect()
-}
-
-/// Bytes of memory of a hole's description.
-fn hole_bytes(hole: &v1::SessionHole) -> usize {
-    let numbers = hole.rim_positions.len()
-        + hole.rim_uvs.len()
-        + hole.grid_positions.len()
-        + hole.patch_uvs.len();
-    8 * numbers + 4 * (hole.hole_cells.len() + hole.patch_faces.len()) + hole.chart_png.len()
 }
 
 /// Patches as a GLB: a mesh for each, in scene space, with its first texture coordinates and its own base colour.
@@ -377,7 +326,7 @@ mod tests {
             let (positions, _) = call.positions(&constraints).unwrap();
             assert_eq!(draft.positions, positions.concat());
             assert_eq!(draft.normals.len(), draft.positions.len());
-            assert!(draft.normals.iter().all(|n| n.norm() > 0.0));
+            assert!(draft.normals.iter().all(|n| (n.norm() - 1.0).abs() < 1e-9));
         }
         // Each draft of a drag starts from the one before: near the patches of the same constraints, if not at their bits.
         let call = session.call(never);

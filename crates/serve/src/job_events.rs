@@ -28,7 +28,8 @@ use darn_contract::v1;
 pub const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
 
 /// Keeps a proxy from collecting events before it hands them on.
-const NO_BUFFERING: (HeaderName, &str) = (HeaderName::from_static("x-accel-buffering"), "no");
+pub(super) const NO_BUFFERING: (HeaderName, &str) =
+    (HeaderName::from_static("x-accel-buffering"), "no");
 /// How often a comment is sent while nothing changes, so that nobody between takes the connection for dead.
 const COMMENT_EVERY: Duration = Duration::from_secs(15);
 /// Events that wait for a client that reads slowly; then the changes wait.
@@ -137,8 +138,10 @@ fn event(job: &v1::Job) -> Bytes {
     text.into()
 }
 
-struct EventBody {
-    received: mpsc::Receiver<Bytes>,
+/// A body of texts that are sent as they are written.
+pub(super) struct EventBody {
+    /// The texts.
+    pub(super) received: mpsc::Receiver<Bytes>,
 }
 
 impl hyper::body::Body for EventBody {

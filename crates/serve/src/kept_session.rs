@@ -1,11 +1,14 @@
 //! One kept scan: its calls, who may use it now, and the constraints of its last successful edit.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::{
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::{Duration, Instant},
+};
 
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use darn_budget::Budget;
-use darn_contract::port::{EditSession, Mended, PatchForm, Patches, Refusal};
+use darn_contract::port::{EditSession, MapSpan, Mended, PatchForm, Patches, Refusal};
 use darn_contract::{Anchor, Constraints, Edit, Search, v1};
 
 /// Bytes a session takes beside its scan.
@@ -15,6 +18,8 @@ pub(super) const OVERHEAD: usize = 1024;
 pub struct KeptSession {
     session: Box<dyn EditSession>,
     last: Mutex<Constraints>,
+    /// When it was edited last.
+    edited: Mutex<Option<Instant>>,
     /// One permit: one request at a time uses the session.
     exclusive: Arc<Semaphore>,
 }
@@ -25,13 +30,17 @@ impl KeptSession {
         Self {
             session,
             last: Mutex::default(),
+            edited: Mutex::default(),
             exclusive: Arc::new(Semaphore::new(1)),
         }
     }
 
     /// The session's description; `id` and `idle_seconds` are left empty.
     pub fn described(&self) -> v1::Session {
-        self.session.described()
+        v1::Session {
+            constraints: Some(self.last().edits_message()),
+            ..self.session.described()
+        }
     }
 
     /// The patches alone. The constraints are remembered if they could be met and the caller still waits for the answer.
@@ -44,7 +53,9 @@ impl KeptSession {
         form: PatchForm,
         budget: &Budget<'_>,
     ) -> Result<Patches, Refusal> {
-        let patches = self.session.patches(constraints, form, budget)?;
+        let patches = self.session.patches(constraints, form, budget);
+        *self.edited() = Some(Instant::now());
+        let patches = patches?;
         if budget.check().is_ok() {
             *self.last() = constraints.clone();
         }
@@ -60,7 +71,9 @@ impl KeptSession {
         constraints: &Constraints,
         budget: &Budget<'_>,
     ) -> Result<Vec<u8>, Refusal> {
-        self.session.draft(constraints, budget)
+        let draft = self.session.draft(constraints, budget);
+        *self.edited() = Some(Instant::now());
+        draft
     }
 
     /// The whole scan, mended with the remembered constraints.
@@ -84,6 +97,23 @@ impl KeptSession {
         self.session.optimize_anchor(search, budget)
     }
 
+    /// Some cells of the map of that search; `None` while edits follow one another, none longer than `quiet` after another: those go first.
+    ///
+    /// # Errors
+    /// The mender's refusal.
+    pub fn map_piece(
+        &self,
+        search: &Search,
+        span: MapSpan,
+        quiet: Duration,
+        budget: &Budget<'_>,
+    ) -> Result<Option<v1::MapPiece>, Refusal> {
+        if (*self.edited()).is_some_and(|edited| edited.elapsed() < quiet) {
+            return Ok(None);
+        }
+        self.session.map_piece(search, span, budget).map(Some)
+    }
+
     /// Waits for exclusive use, in order of arrival, until the permit is dropped. Blocks no thread.
     pub async fn exclusive(&self) -> Option<OwnedSemaphorePermit> {
         // The semaphore is never closed, so this is never `None`.
@@ -92,6 +122,10 @@ impl KeptSession {
 
     fn last(&self) -> MutexGuard<'_, Constraints> {
         self.last.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn edited(&self) -> MutexGuard<'_, Option<Instant>> {
+        self.edited.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Memory it takes, in bytes.

@@ -6,6 +6,7 @@
 #![warn(clippy::print_stderr, clippy::print_stdout)]
 
 mod accept;
+mod anchor_lines;
 mod answer;
 mod app;
 mod authorization;

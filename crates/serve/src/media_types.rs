@@ -26,5 +26,7 @@ pub const PROBLEM_JSON: &str = "application/problem+json";
 pub const TEXT: &str = "text/plain";
 /// Metrics in the Prometheus text format.
 pub const PROMETHEUS: &str = "text/plain; version=0.0.4";
+/// One JSON message a line.
+pub const NDJSON: &str = "application/x-ndjson";
 /// Server-sent events.
 pub const EVENT_STREAM: &str = "text/event-stream";

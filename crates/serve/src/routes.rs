@@ -1,6 +1,9 @@
 //! The HTTP routes of a scan sent with each request, the probes, and the layers around all routes.
 
-use std::{sync::Arc, time::Instant};
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use axum::{
     Router,
@@ -78,6 +81,9 @@ pub fn finish(routes: Router<Arc<App>>, app: &Arc<App>) -> Router {
         .with_state(Arc::clone(app))
 }
 
+/// How long a browser may go by the answer to a preflight: as long as Chromium does at most, which is less than others.
+const PREFLIGHT_AGE: Duration = Duration::from_secs(2 * 60 * 60);
+
 fn cors(origins: &[String]) -> CorsLayer {
     let origins = if origins.iter().any(|origin| origin == "*") {
         AllowOrigin::any()
@@ -91,6 +97,7 @@ fn cors(origins: &[String]) -> CorsLayer {
     CorsLayer::new()
         .allow_origin(origins)
         .allow_methods([Method::GET, Method::POST, Method::DELETE])
+        .max_age(PREFLIGHT_AGE)
         .allow_headers([
             header::ACCEPT,
             header::AUTHORIZATION,

@@ -14,11 +14,12 @@ use uuid::Uuid;
 
 use super::{
     accept::preferred,
+    anchor_lines,
     app::{App, UploadPermit},
     body::{self, ScanRequest},
     client::Caller,
     error::RequestError,
-    media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, OBJ, OCTET_STREAM, PLY},
+    media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, NDJSON, OBJ, OCTET_STREAM, PLY},
     parameters::{self, Parameters},
     response::{self, MendResponse},
     session_store::SessionError,
@@ -71,7 +72,11 @@ async fn open(State(app): State<Arc<App>>, request: Request) -> Result<Response,
     let idle_seconds = sessions.limits().idle.as_secs_f64();
     let job = app.submit(upload, scan.len(), move |mender, budget| {
         let session = mender.open(scan, &constraints, budget)?;
-        let text = session_json(session.described(), id, idle_seconds);
+        let described = v1::Session {
+            constraints: Some(v1::Constraints::default()),
+            ..session.described()
+        };
+        let text = session_json(described, id, idle_seconds);
         Ok((session, text))
     });
     // Inserted only while the caller still waits: an abandoned session must not evict another.
@@ -138,9 +143,20 @@ async fn optimize_anchor(
     SessionId(id): SessionId,
     request: Request,
 ) -> Result<Response, RequestError> {
+    let media_type = preferred(request.headers(), &[JSON, NDJSON]);
     let SessionRequest { parameters, upload } = receive::<Search>(&app, id, request).await?;
     let place = "the body, application/json";
     let search = parameters.ok_or(RequestError::NoQuery { place })?;
+    if media_type == NDJSON {
+        let client = upload.client().clone();
+        let searched = anchor_lines::Searched {
+            app,
+            client,
+            id,
+            search,
+        };
+        return anchor_lines::answer(searched, upload).await;
+    }
     let text = app
         .submit_to_session(id, upload, move |session, budget| {
             session

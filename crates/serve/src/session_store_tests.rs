@@ -11,7 +11,7 @@ use crate::client_address::ClientAddress;
 use crate::kept_session::OVERHEAD;
 use crate::telemetry::Metrics;
 use darn_budget::{Budget, Limits};
-use darn_contract::port::{Mended, PatchForm, Patches, Refusal};
+use darn_contract::port::{MapSpan, Mended, PatchForm, Patches, Refusal};
 use darn_contract::{Anchor, Constraints, Search, v1};
 
 const IDLE: Duration = Duration::from_secs(60);
@@ -59,6 +59,10 @@ impl EditSession for SizedSession {
 
     fn optimize_anchor(&self, _: &Search, _: &Budget<'_>) -> Result<v1::AnchorFound, Refusal> {
         Ok(v1::AnchorFound::default())
+    }
+
+    fn map_piece(&self, _: &Search, _: MapSpan, _: &Budget<'_>) -> Result<v1::MapPiece, Refusal> {
+        Ok(v1::MapPiece::default())
     }
 }
 

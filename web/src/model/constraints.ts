@@ -1,5 +1,5 @@
 /** What a person asks of the new cloth, as the constraints of the contract. Values never change; edits make new ones. */
-import type { Anchor, Constraints, Edit, Loop } from '../client.js';
+import type { Anchor, Border, Constraints, Cut, Edit, Loop, SessionHole } from '../client.js';
 import { isHole } from './loops.js';
 
 /** Constraints without the choice of holes, which belongs to the session. */
@@ -8,20 +8,37 @@ export interface ClothConstraints {
   readonly edits: readonly Edit[];
 }
 
-/** The loops to fill. */
+/** Cloth to cut out first, or a stretch of the cloth's own edge: an entry of `holes` that makes the hole that it fills. */
+export type MadeHole = { readonly cut: Cut } | { readonly border: Border };
+
+/** What to fill. */
 export interface Choice {
-  /** By id, in order. */
+  /** Loops by id, in order; those of made holes may be among them. */
   readonly holes: readonly number[];
+  readonly made: readonly MadeHole[];
   /** Whether patches that are no plausible cloth are applied, too. */
   readonly acceptDoubtful: boolean;
 }
 
 export const NO_CONSTRAINTS: ClothConstraints = { anchors: [], edits: [] };
 
-/** The constraints that concern some holes; those that name no hole are kept. */
-export function onHoles(constraints: ClothConstraints, holes: ReadonlySet<number>): ClothConstraints {
-  const kept = (item: { hole?: number }): boolean => item.hole === undefined || holes.has(item.hole);
-  return { anchors: constraints.anchors.filter(kept), edits: constraints.edits.filter(kept) };
+/**
+ * Constraints on other holes than those they were made on: each goes with its hole, which is known by its rim, as a cut may change numbers. Those of
+ * holes that are gone, or have another rim, are left out; those that name no hole are kept.
+ */
+export function carried(
+  { anchors, edits }: ClothConstraints,
+  before: readonly SessionHole[],
+  after: readonly SessionHole[],
+): ClothConstraints {
+  const rimOf = ({ rimPositions = [] }: SessionHole): string => rimPositions.join();
+  const byRim = new Map(after.map((hole) => [rimOf(hole), hole.id ?? 0]));
+  const renamed = new Map(before.map((hole) => [hole.id ?? 0, byRim.get(rimOf(hole))]));
+  const moved = <T extends { hole?: number }>(item: T): T[] => {
+    const hole = item.hole === undefined ? undefined : renamed.get(item.hole);
+    return item.hole === undefined ? [item] : hole === undefined ? [] : [{ ...item, hole }];
+  };
+  return { anchors: anchors.flatMap(moved), edits: edits.flatMap(moved) };
 }
 
 /** The message for `POST /sessions/{id}/inpaint`. */
@@ -36,10 +53,11 @@ export function messageOf(constraints: ClothConstraints): Constraints {
  * The choice of loops for `POST /sessions`. Holes are chosen by leaving the others out, so that one that cannot be filled is skipped; a loop
  * of another kind must be named, and the service then refuses it where it cannot be filled.
  */
-export function selectionOf(loops: readonly Loop[], { holes: chosen, acceptDoubtful }: Choice): Constraints {
+export function selectionOf(loops: readonly Loop[], { holes: chosen, made, acceptDoubtful }: Choice): Constraints {
   const id = (loop: Loop): number => loop.id ?? 0;
   const holes = loops.filter(isHole).map(id);
-  const named = loops.filter((loop) => !isHole(loop) && chosen.includes(id(loop))).map((loop) => ({ id: id(loop) }));
+  const others = loops.filter((loop) => !isHole(loop) && chosen.includes(id(loop))).map((loop) => ({ id: id(loop) }));
+  const named = [...others, ...made];
   const except = holes.filter((hole) => !chosen.includes(hole));
   return {
     ...(named.length > 0 && { holes: named }),
@@ -51,17 +69,24 @@ export function selectionOf(loops: readonly Loop[], { holes: chosen, acceptDoubt
 }
 
 /** The message for `POST /inpaint`, which does in one request what the editor shows. */
-export function statelessMessageOf({ holes, acceptDoubtful }: Choice, constraints: ClothConstraints): Constraints {
+export function statelessMessageOf(
+  loops: readonly Loop[],
+  { holes, made, acceptDoubtful }: Choice,
+  constraints: ClothConstraints,
+): Constraints {
+  // Of made holes the entries that make them are enough.
+  const ofScan = holes.filter((id) => loops.some((loop) => (loop.id ?? 0) === id));
   return {
-    holes: holes.map((id) => ({ id })),
+    holes: [...ofScan.map((id) => ({ id })), ...made],
     ...(acceptDoubtful && { acceptDoubtful }),
     ...messageOf(constraints),
   };
 }
 
-/** A constraints file: the holes that it chooses by id, if any, and the rest. */
+/** A constraints file: the holes that it chooses by id, if it chooses any, those that it makes, and the rest. */
 export interface ConstraintsFile {
   readonly holes: readonly number[] | undefined;
+  readonly made: readonly MadeHole[];
   readonly acceptDoubtful: boolean;
   readonly constraints: ClothConstraints;
 }
@@ -92,20 +117,32 @@ export function readConstraints(text: string): ConstraintsFile {
   if (typeof acceptDoubtful !== 'boolean') {
     throw new Error('`acceptDoubtful` must be true or false.');
   }
-  return { holes: holes === undefined ? undefined : holeIds(holes), acceptDoubtful, constraints: { anchors, edits } };
+  return { ...chosenHoles(holes), acceptDoubtful, constraints: { anchors, edits } };
 }
 
-function holeIds(holes: unknown): number[] {
+function chosenHoles(holes: unknown): Pick<ConstraintsFile, 'holes' | 'made'> {
+  if (holes === undefined) {
+    return { holes: undefined, made: [] };
+  }
   if (!isObjects(holes)) {
     throw new Error('`holes` must be a list of objects.');
   }
-  return holes.map((hole) => {
-    const id = (hole as { id?: unknown }).id;
-    if (typeof id !== 'number' || !Number.isInteger(id)) {
-      throw new Error('The editor reads holes by `id` alone.');
+  const ids: number[] = [];
+  const made: MadeHole[] = [];
+  for (const hole of holes as { id?: unknown; cut?: Cut; border?: Border | 'auto' }[]) {
+    if (typeof hole.id === 'number' && Number.isInteger(hole.id)) {
+      ids.push(hole.id);
+    } else if (typeof hole.cut === 'object') {
+      made.push({ cut: hole.cut });
+    } else if (hole.border === 'auto') {
+      made.push({ border: { auto: true } });
+    } else if (typeof hole.border === 'object') {
+      made.push({ border: hole.border });
+    } else {
+      throw new Error('The editor reads holes by `id`, `cut` and `border`.');
     }
-    return id;
-  });
+  }
+  return { holes: ids, made };
 }
 
 function isObjects(value: unknown): value is object[] {

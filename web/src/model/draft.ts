@@ -1,7 +1,8 @@
-/** A gesture or an anchor while it is made, before it is a step. */
-import type { Anchor, Edit, Uv, Vec3 } from '../client.js';
+/** A gesture, an anchor, a cut or a stretch of border while it is made, before it is a step. */
+import type { Anchor, BorderCandidate, Edit, Loop, Uv, Vec3 } from '../client.js';
 import { locate, middleOf, normalOf, positionOf } from './cloth.js';
-import type { ClothConstraints } from './constraints.js';
+import type { ClothConstraints, MadeHole } from './constraints.js';
+import { byKind } from './loops.js';
 import type { Patch } from './scan_session.js';
 
 /** Pulls the cloth at a point. */
@@ -39,10 +40,41 @@ export interface AnchorDraft {
   readonly hole: number;
   readonly position: Vec3;
   readonly hard: boolean;
+  /** Where on the chart a hand has put it; otherwise its place is searched. */
+  readonly uv?: Uv;
+  /** The index of the anchor that it takes the place of. */
+  readonly replaces?: number;
 }
 
-export type Draft = GrabDraft | TwistDraft | PinchDraft | AnchorDraft;
+/** A ball: the scan's cloth that reaches into it is cut out, and mended. */
+export interface CutDraft {
+  readonly kind: 'cut';
+  readonly center: Vec3;
+  readonly radius: number;
+}
+
+/** A stretch of the cloth's own edge to mend up to a new hem. */
+export interface BorderDraft {
+  readonly kind: 'border';
+  readonly from: Vec3;
+  readonly to: Vec3;
+  /** Points that the new hem goes through; without any it continues the hem on both sides. */
+  readonly along: readonly Vec3[];
+}
+
+/** What changes new cloth. */
+export type ClothDraft = GrabDraft | TwistDraft | PinchDraft | AnchorDraft;
+export type GestureDraft = Exclude<ClothDraft, AnchorDraft>;
+/** What makes a hole that is mended. */
+export type MakingDraft = CutDraft | BorderDraft;
+export type Draft = ClothDraft | MakingDraft;
+export type ClothKind = ClothDraft['kind'];
 export type DraftKind = Draft['kind'];
+
+/** Whether a draft makes a hole, and does not change new cloth. */
+export function isMaking(draft: Draft): draft is MakingDraft {
+  return draft.kind === 'cut' || draft.kind === 'border';
+}
 
 /** What a step is called that was made of a draft. */
 export const NAMES: Readonly<Record<DraftKind, string>> = {
@@ -50,10 +82,12 @@ export const NAMES: Readonly<Record<DraftKind, string>> = {
   twist: 'Twist',
   pinch: 'Pinch',
   anchor: 'Anchor',
+  cut: 'Cut out',
+  border: 'Border',
 };
 
 /** A draft that changes nothing yet, in the middle of a patch. */
-export function firstDraft(kind: DraftKind, patch: Patch): Draft {
+export function firstDraft(kind: ClothKind, patch: Patch): ClothDraft {
   const hole = patch.hole.id ?? 0;
   const uv = middleOf(patch);
   const point = locate(patch, uv);
@@ -69,22 +103,84 @@ export function firstDraft(kind: DraftKind, patch: Patch): Draft {
   }
 }
 
+/** Where cuts and borders of a scan begin for who types them. */
+export interface MakingStart {
+  readonly loops: readonly Loop[];
+  readonly candidates: readonly BorderCandidate[];
+}
+
+/** A ball around the edge of the largest hole, or the first bite or rip that was found. */
+export function firstMaking(kind: MakingDraft['kind'], { loops, candidates }: MakingStart): MakingDraft {
+  const [first] = byKind(loops)[0]?.[1] ?? [];
+  const centroid = pointOf(first?.centroid);
+  switch (kind) {
+    case 'cut': {
+      const radius = (first?.diameter ?? 1) * (first?.kind === 'HOLE' ? 0.55 : 0.05);
+      return { kind, center: centroid, radius };
+    }
+    case 'border': {
+      const { from, to } = candidates[0]?.border ?? {};
+      return { kind, from: from ? pointOf(from) : centroid, to: to ? pointOf(to) : centroid, along: [] };
+    }
+  }
+}
+
+function pointOf([x = 0, y = 0, z = 0]: readonly number[] = []): Vec3 {
+  return [x, y, z];
+}
+
+/** The points of a stretch of border that a hand can hold: its ends, then those that the new hem goes through. */
+export function handlesOf({ from, to, along }: BorderDraft): readonly Vec3[] {
+  return [from, to, ...along];
+}
+
+/** A stretch with one of its handles elsewhere. */
+export function withHandle(draft: BorderDraft, handle: number, point: Vec3): BorderDraft {
+  const [from, to, ...along] = handlesOf(draft).map((it, at) => (at === handle ? point : it)) as [Vec3, Vec3];
+  return { ...draft, from, to, along };
+}
+
+/** The entry of `holes` that a draft stands for. */
+export function madeBy(draft: MakingDraft): MadeHole {
+  switch (draft.kind) {
+    case 'cut':
+      return { cut: { center: [...draft.center], radius: draft.radius } };
+    case 'border': {
+      const along = draft.along.map((point) => [...point]);
+      return { border: { from: [...draft.from], to: [...draft.to], ...(along.length > 0 && { along }) } };
+    }
+  }
+}
+
 /** The constraints with a gesture at the end. Anchors get their place first: see `Editor.placeAnchor`. */
-export function withGesture(constraints: ClothConstraints, draft: Exclude<Draft, AnchorDraft>): ClothConstraints {
+export function withGesture(constraints: ClothConstraints, draft: GestureDraft): ClothConstraints {
   return { ...constraints, edits: [...constraints.edits, editOf(draft)] };
 }
 
-/** The constraints with an anchor at the end. */
+/** The constraints with an anchor at a place of the chart: at the end, or in place of the one that it replaces. */
 export function withAnchor(
   constraints: ClothConstraints,
-  { hole, position, hard }: AnchorDraft,
+  { hole, position, hard, replaces }: AnchorDraft,
   uv: Uv,
 ): ClothConstraints {
   const anchor: Anchor = { hole, uv: [...uv], position: [...position], ...(hard && { hard }) };
-  return { ...constraints, anchors: [...constraints.anchors, anchor] };
+  const { anchors } = constraints;
+  const isNew = replaces === undefined || replaces >= anchors.length;
+  return { ...constraints, anchors: isNew ? [...anchors, anchor] : anchors.with(replaces, anchor) };
 }
 
-function editOf(draft: Exclude<Draft, AnchorDraft>): Edit {
+/** The constraints under which a draft is shown while it is made; undefined for one that changes no cloth yet. */
+export function previewed(constraints: ClothConstraints, draft: Draft): ClothConstraints | undefined {
+  if (isMaking(draft)) {
+    return undefined;
+  }
+  if (draft.kind === 'anchor') {
+    return draft.uv && withAnchor(constraints, draft, draft.uv);
+  }
+  return withGesture(constraints, draft);
+}
+
+function editOf(draft: GestureDraft): Edit {
   const { hole } = draft;
   switch (draft.kind) {
     case 'grab':

@@ -3,9 +3,8 @@ import {
   type AnchorFound,
   type HoleReport,
   type Info,
-  type Loop,
+  type MapPiece,
   type Progress,
-  type Report,
   type Service,
   type Skipped,
   type Uv,
@@ -13,64 +12,22 @@ import {
   describeError,
   isAbort,
 } from '../client.js';
+import { AnchorMap } from './anchor_map.js';
 import { hasChart } from './cloth.js';
 import {
   type Choice,
   type ClothConstraints,
-  NO_CONSTRAINTS,
+  type MadeHole,
+  carried,
   messageOf,
-  onHoles,
   readConstraints,
   statelessMessageOf,
 } from './constraints.js';
-import { type AnchorDraft, type Draft, type DraftKind, NAMES, withAnchor, withGesture } from './draft.js';
+import { type AnchorDraft, type Draft, NAMES, isMaking, madeBy, previewed, withAnchor, withGesture } from './draft.js';
+import { type FoundAnchor, type OpenScan, START, type Step, type Tool, type Work } from './editor_state.js';
 import { History } from './history.js';
 import { isHole } from './loops.js';
 import { type Patch, ScanSession } from './scan_session.js';
-
-/** A state that undo can return to: what is filled, and how. It has the positions, so that it is shown at once. */
-export interface Step extends Choice {
-  /** What was done, for the buttons of undo and redo. */
-  readonly label: string;
-  readonly constraints: ClothConstraints;
-  readonly patches: readonly Patch[];
-  readonly report: Report | undefined;
-}
-
-/** What a pointer on the new cloth does. */
-export type Tool = 'look' | DraftKind;
-
-/** The scan that is open. */
-export interface OpenScan {
-  readonly file: Blob;
-  readonly name: string;
-  readonly bytes: ArrayBuffer;
-  readonly loops: readonly Loop[];
-  readonly notes: readonly string[];
-}
-
-/** Something that takes time, as shown to the person. */
-export interface Work {
-  readonly label: string;
-  /** From 0 to 1; undefined while it is not known. */
-  readonly share: number | undefined;
-  readonly stop: AbortController;
-}
-
-/** Where the anchor search found a point's place. */
-export interface FoundAnchor {
-  readonly hole: number;
-  readonly found: AnchorFound;
-}
-
-const START: Step = {
-  label: 'Open',
-  holes: [],
-  acceptDoubtful: false,
-  constraints: NO_CONSTRAINTS,
-  patches: [],
-  report: undefined,
-};
 
 /**
  * The editor's state. It emits `change` whenever something shown has changed, `opened` after another scan was opened, `mended` after holes
@@ -90,6 +47,8 @@ export class Editor extends EventTarget {
   draftPatches: readonly Patch[] | undefined;
   /** Of the last anchor search. */
   found: FoundAnchor | undefined;
+  /** The map that was asked for last. */
+  map: AnchorMap | undefined;
   work: Work | undefined;
   /** The last error, until the next action. */
   problem: string | undefined;
@@ -142,15 +101,16 @@ export class Editor extends EventTarget {
         throw new Error(`${name} has ${file.size} bytes; this service takes at most ${limit}.`);
       }
       const bytes = await file.arrayBuffer();
-      const { loops = [], notes = [] } = await this.service.holes(file, progress);
+      const { loops = [], candidates = [], notes = [] } = await this.service.holes(file, progress);
       this.session?.close();
       this.session = new ScanSession(this.service, file, loops);
-      this.scan = { file, name, bytes, loops, notes };
+      this.scan = { file, name, bytes, loops, candidates, notes };
       this.history = new History<Step>(START);
       this.chosen = new Set(loops.filter(isHole).map((loop) => loop.id ?? 0));
       this.skipped = [];
       this.acceptDoubtful = false;
       this.found = undefined;
+      this.dropMap();
       this.dropDraft();
       const holes = this.chosen.size;
       this.message = `${name} is open: ${holes} ${holes === 1 ? 'hole' : 'holes'} in ${loops.length} boundary loops.`;
@@ -191,24 +151,44 @@ export class Editor extends EventTarget {
     const holes = [...this.chosen].sort((a, b) => a - b);
     const count = `${holes.length} ${holes.length === 1 ? 'hole' : 'holes'}`;
     const { acceptDoubtful } = this;
-    const constraints = onHoles(this.step.constraints, this.chosen);
-    await this.apply(`Mend ${count}`, { holes, acceptDoubtful }, constraints, 'mended');
+    await this.fill(`Mend ${count}`, { holes, made: this.step.made, acceptDoubtful });
+  }
+
+  /** Mends a hole that an entry of `holes` makes, beside what is filled already. */
+  async make(label: string, entry: MadeHole): Promise<void> {
+    const { step } = this;
+    await this.fill(label, { ...step, made: [...step.made, entry] });
+  }
+
+  /** Takes back a made hole: cloth that was cut out is there again. */
+  async unmake(entry: MadeHole): Promise<void> {
+    const { step } = this;
+    const made = step.made.filter((it) => it !== entry);
+    // The numbers of made holes mean nothing without them.
+    const holes = step.holes.filter((id) => this.scan?.loops.some((loop) => loop.id === id));
+    if (holes.length + made.length === 0) {
+      this.history.push({ ...START, label: 'Put back' });
+      this.say('Put back: nothing is mended.');
+    } else {
+      await this.fill('Put back', { ...step, holes, made });
+    }
   }
 
   /** Shows a gesture while it is made: sends it when the answer to the one before has come. An anchor's place is found only at its commit. */
   preview(draft: Draft): void {
     this.draft = draft;
     this.changed();
-    if (draft.kind === 'anchor') {
+    if (previewed(this.step.constraints, draft) === undefined) {
       return;
     }
     this.live.offer(async () => {
       const { step, session } = this;
-      if (this.draft !== draft || session === undefined) {
+      const constraints = previewed(step.constraints, draft);
+      if (this.draft !== draft || session === undefined || constraints === undefined) {
         return;
       }
       try {
-        const patches = await session.preview(step, messageOf(withGesture(step.constraints, draft)));
+        const patches = await session.preview(step, messageOf(constraints));
         if (this.draft !== undefined && this.step === step) {
           this.draftPatches = patches;
           this.changed();
@@ -225,7 +205,11 @@ export class Editor extends EventTarget {
     if (draft === undefined) {
       return;
     }
-    if (draft.kind === 'anchor') {
+    if (isMaking(draft)) {
+      await this.make(NAMES[draft.kind], madeBy(draft));
+    } else if (draft.kind === 'anchor' && draft.uv !== undefined) {
+      await this.apply('Move anchor', this.step, withAnchor(this.step.constraints, draft, draft.uv));
+    } else if (draft.kind === 'anchor') {
       await this.placeAnchor(draft);
     } else {
       const constraints = withGesture(this.step.constraints, draft);
@@ -240,15 +224,11 @@ export class Editor extends EventTarget {
     this.changed();
   }
 
-  /**
-   * Finds where on a hole's chart a point in space belongs.
-   *
-   * @param map - Whether the loss of every cell is asked for, which takes longer.
-   */
-  async findAnchor({ hole, position }: AnchorDraft, map: boolean): Promise<FoundAnchor | undefined> {
+  /** Finds where on a hole's chart a point in space belongs. */
+  private async findAnchor({ hole, position }: AnchorDraft): Promise<FoundAnchor | undefined> {
     let result: FoundAnchor | undefined;
-    await this.working(map ? 'Drawing the map' : 'Searching', async (progress) => {
-      const query = { hole, target: [...position], map };
+    await this.working('Searching', async (progress) => {
+      const query = { hole, target: [...position] };
       const found = await this.session?.optimizeAnchor(this.step, query, progress);
       if (found !== undefined) {
         result = { hole, found };
@@ -259,9 +239,52 @@ export class Editor extends EventTarget {
     return result;
   }
 
+  /** Draws the map of an anchor search while its cells come. Everything else can be done meanwhile. */
+  async drawMap({ hole, position }: AnchorDraft): Promise<void> {
+    this.stopMap();
+    const map = new AnchorMap(hole, position);
+    this.map = map;
+    this.problem = undefined;
+    this.say('The map is being drawn.');
+    try {
+      const events = {
+        onFound: (found: AnchorFound): void => {
+          this.found = { hole, found };
+          this.changed();
+        },
+        onMap: (piece: MapPiece): void => {
+          map.add(piece);
+          this.changed();
+        },
+      };
+      const query = { hole, target: [...position] };
+      await this.session?.anchorMap(this.step, query, events, { signal: map.signal });
+      this.say('The map is complete.');
+    } catch (error) {
+      map.stop();
+      this.report(error);
+    }
+  }
+
+  /** Ends the map that is being drawn; what is known of it stays. */
+  stopMap(): void {
+    if (this.map?.isComing) {
+      this.map.stop();
+      this.say('The map is stopped.');
+    }
+  }
+
+  private dropMap(): void {
+    this.map?.stop();
+    this.map = undefined;
+  }
+
   /** Searches the place of an anchor and adds it as a step. */
   private async placeAnchor(draft: AnchorDraft): Promise<void> {
-    const uv = (await this.findAnchor(draft, false))?.found.uv;
+    if (this.map !== undefined && this.map.target.join() !== draft.position.join()) {
+      this.dropMap();
+    }
+    const uv = (await this.findAnchor(draft))?.found.uv;
     if (uv !== undefined) {
       const constraints = withAnchor(this.step.constraints, draft, uv as Uv);
       await this.apply(draft.hard ? 'Hard anchor' : NAMES.anchor, this.step, constraints);
@@ -283,7 +306,8 @@ export class Editor extends EventTarget {
 
   /** The constraints of the present step, as `POST /inpaint` takes them. */
   constraintsText(): string {
-    return JSON.stringify(statelessMessageOf(this.step, this.step.constraints), undefined, 2);
+    const message = statelessMessageOf(this.scan?.loops ?? [], this.step, this.step.constraints);
+    return JSON.stringify(message, undefined, 2);
   }
 
   /** Applies constraints that were copied or saved before. */
@@ -298,8 +322,9 @@ export class Editor extends EventTarget {
     const { scan, step } = this;
     const all = (scan?.loops ?? []).filter(isHole).map((loop) => loop.id ?? 0);
     const holes = [...(file.holes ?? (step.holes.length > 0 ? step.holes : all))].sort((a, b) => a - b);
-    this.acceptDoubtful = file.acceptDoubtful;
-    await this.apply('Load constraints', { holes, acceptDoubtful: file.acceptDoubtful }, file.constraints);
+    const { made, acceptDoubtful } = file;
+    this.acceptDoubtful = acceptDoubtful;
+    await this.apply('Load constraints', { holes, made, acceptDoubtful }, file.constraints);
     this.choose(new Set(this.step.holes));
   }
 
@@ -334,26 +359,56 @@ export class Editor extends EventTarget {
     this.changed();
   }
 
-  /** Asks the service for a state and makes it a step. */
-  private async apply(
-    label: string,
-    choice: Choice,
-    constraints: ClothConstraints,
-    event: 'mended' | 'edited' = 'edited',
-  ): Promise<void> {
+  /** Fills other holes than now, the constraints of the present step on those that stay. */
+  private async fill(label: string, choice: Choice): Promise<void> {
+    const { step, draft } = this;
     await this.working(label, async (progress) => {
-      if (this.session === undefined || choice.holes.length === 0) {
-        return;
+      const { session } = this;
+      if (session !== undefined) {
+        const holes = await session.holes(choice, progress);
+        const constraints = carried(
+          step.constraints,
+          step.patches.map((patch) => patch.hole),
+          holes,
+        );
+        await this.take(label, { choice, constraints }, progress);
+        this.dispatchEvent(new Event('mended'));
       }
-      const { patches, report } = await this.session.mend(choice, messageOf(constraints), progress);
-      this.skipped = this.session.skipped;
-      const holes = patches.map((patch) => patch.hole.id ?? 0);
-      const { acceptDoubtful } = choice;
-      this.history.push({ label, holes, acceptDoubtful, constraints, patches, report });
-      this.message = this.messageOfStep(label, this.history.present);
-      this.dispatchEvent(new Event(event));
+    });
+    // A cut or a border that is refused can be changed.
+    if (this.step !== step || draft === undefined || !isMaking(draft)) {
+      this.dropDraft();
+    }
+  }
+
+  /** Fills holes under constraints. */
+  private async apply(label: string, choice: Choice, constraints: ClothConstraints): Promise<void> {
+    await this.working(label, async (progress) => {
+      if (choice.holes.length + choice.made.length > 0) {
+        await this.take(label, { choice, constraints }, progress);
+        this.dispatchEvent(new Event('edited'));
+      }
     });
     this.dropDraft();
+  }
+
+  /** Asks the service for a state and makes it a step. */
+  private async take(
+    label: string,
+    { choice, constraints }: { choice: Choice; constraints: ClothConstraints },
+    progress: Progress,
+  ): Promise<void> {
+    const { session } = this;
+    if (session === undefined) {
+      return;
+    }
+    const { patches, report } = await session.mend(choice, messageOf(constraints), progress);
+    const { skipped, cutFaces } = session;
+    this.skipped = skipped;
+    const holes = patches.map((patch) => patch.hole.id ?? 0);
+    const { made, acceptDoubtful } = choice;
+    this.history.push({ label, holes, made, acceptDoubtful, constraints, patches, cutFaces, report });
+    this.message = this.messageOfStep(label, this.history.present);
   }
 
   private messageOfStep(label: string, step: Step): string {
@@ -370,6 +425,7 @@ export class Editor extends EventTarget {
     if (this.step !== before) {
       this.message = `${word}. Now: ${this.step.label}.`;
       this.found = undefined;
+      this.dropMap();
       this.problem = undefined;
     }
     this.dropDraft();

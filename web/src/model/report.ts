@@ -13,6 +13,10 @@ export function holeInWords(hole: HoleReport): string[] {
     `${stretchInWords(patch.stretchMean, patch.stretchMax)} ${crossingsInWords(patch.selfIntersections ?? 0)}`,
     patch.method === 'fair' ? NO_CHART : shareInWords(patch.networkShare),
   ];
+  if (hole.cut !== undefined && (hole.cut.faces ?? 0) > 0) {
+    const cut = (hole.cut.faces ?? 0).toLocaleString('en');
+    lines.push(`${cut} triangles of the scan were cut out first, area ${short(hole.cut.area)}.`);
+  }
   for (const anchor of hole.anchors ?? []) {
     const beyond = anchor.beyondReach ?? 0;
     const reach = beyond > 0 ? `; ${short(beyond)} of that is beyond the cloth's reach` : '';

@@ -5,9 +5,11 @@ import {
   type Constraints,
   type HolePositions,
   type Loop,
+  type MapEvents,
   type Progress,
   type Report,
   type Service,
+  type SessionHole,
   type Skipped,
   ClothSession,
 } from '../client.js';
@@ -50,6 +52,16 @@ export class ScanSession {
     return this.opened?.cloth.skipped ?? [];
   }
 
+  /** The middles of the triangles that are cut out, `x, y, z` of each. */
+  get cutFaces(): readonly number[] {
+    return this.opened?.cloth.cutFaces ?? [];
+  }
+
+  /** The holes that a choice fills. */
+  async holes(choice: Choice, progress: Progress): Promise<readonly SessionHole[]> {
+    return (await this.open(choice, progress)).cloth.holes;
+  }
+
   /** The patches under constraints, and the report. */
   async mend(
     choice: Choice,
@@ -64,12 +76,17 @@ export class ScanSession {
   /** The patches under constraints, as fast as the service can. */
   async preview(choice: Choice, constraints: Constraints): Promise<Patch[]> {
     const opened = await this.open(choice, {});
-    return dressed(await opened.cloth.positions(constraints), opened);
+    return dressed(await opened.cloth.draft(constraints), opened);
   }
 
   /** Where on a hole's chart a point belongs. */
   async optimizeAnchor(choice: Choice, query: AnchorQuery, progress: Progress): Promise<AnchorFound> {
     return (await this.open(choice, progress)).cloth.optimizeAnchor(query, progress);
+  }
+
+  /** The same, and the map as it is computed. */
+  async anchorMap(choice: Choice, query: AnchorQuery, events: MapEvents, progress: Progress): Promise<void> {
+    await (await this.open(choice, progress)).cloth.anchorMap(query, events, progress);
   }
 
   /** The whole scan under constraints. */
@@ -100,8 +117,8 @@ export class ScanSession {
 }
 
 /** A choice as a text to compare. */
-function keyOf({ holes, acceptDoubtful }: Choice): string {
-  return `${holes.join()} ${acceptDoubtful}`;
+function keyOf({ holes, made, acceptDoubtful }: Choice): string {
+  return JSON.stringify([holes, made, acceptDoubtful]);
 }
 
 function dressed(patches: readonly HolePositions[], { dressing }: Opened): Patch[] {

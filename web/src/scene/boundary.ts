@@ -20,7 +20,7 @@ export function boundaryLines(positions: Float32Array, triangles: Uint32Array): 
 }
 
 /** For each vertex, the first one at its position: by a hash table with open addressing over the positions' bits. */
-function weld(positions: Float32Array): Uint32Array {
+export function weld(positions: Float32Array): Uint32Array {
   const count = positions.length / 3;
   const slots = 2 ** Math.ceil(Math.log2(2 * count + 1));
   const table = new Int32Array(slots).fill(-1);

@@ -1,7 +1,7 @@
 /** What is drawn for the gesture that is being made. */
 import type { Uv } from '../client.js';
 import { type ClothPoint, locate, normalOf, positionOf } from '../model/cloth.js';
-import type { Draft } from '../model/draft.js';
+import { type ClothDraft, type MakingDraft, isMaking } from '../model/draft.js';
 import type { Editor } from '../model/editor.js';
 import type { Patch } from '../model/scan_session.js';
 import { Vector3 } from '../vendor.js';
@@ -10,13 +10,28 @@ import { type Marked, circle } from './marks.js';
 /** Cells of a grid's side. */
 const GRID = 64;
 
+/** What marks need of the picture. */
+export interface Waiting {
+  /** The first point of a pinch. */
+  readonly cloth: ClothPoint | undefined;
+  /** The first end of a stretch of border. */
+  readonly border: Vector3 | undefined;
+  /** The shorter way along the cloth's own edge. */
+  stretch(from: Vector3, to: Vector3): Vector3[];
+}
+
 /**
  * The handle where the hand is, the tether from there to where the cloth is now, the ring of a twist.
- *
- * @param waiting - The first point of a pinch.
  */
-export function marksOf(editor: Editor, waiting: ClothPoint | undefined): Marked {
+export function marksOf(editor: Editor, gesture: Waiting): Marked {
   const { draft } = editor;
+  const { cloth: waiting, border } = gesture;
+  if (draft !== undefined && isMaking(draft)) {
+    return makingMarks(draft, gesture);
+  }
+  if (border !== undefined) {
+    return { handles: [border] };
+  }
   const hole = draft?.hole ?? waiting?.hole;
   const before = editor.step.patches.find((patch) => patch.hole.id === hole);
   const now = editor.patches.find((patch) => patch.hole.id === hole);
@@ -29,7 +44,21 @@ export function marksOf(editor: Editor, waiting: ClothPoint | undefined): Marked
   return draftMarks(draft, before, now, editor.reportOf(draft.hole)?.grid?.spacingMean ?? 0);
 }
 
-function draftMarks(draft: Draft, before: Patch, now: Patch, spacing: number): Marked {
+function makingMarks(draft: MakingDraft, { stretch }: Waiting): Marked {
+  switch (draft.kind) {
+    case 'cut': {
+      const center = new Vector3(...draft.center);
+      return { handles: [center], ball: { center, radius: draft.radius } };
+    }
+    case 'border': {
+      const [from, to] = [new Vector3(...draft.from), new Vector3(...draft.to)];
+      const along = draft.along.map((point) => new Vector3(...point));
+      return { handles: [from, to, ...along], stretch: stretch(from, to), dashes: [from, ...along, to] };
+    }
+  }
+}
+
+function draftMarks(draft: ClothDraft, before: Patch, now: Patch, spacing: number): Marked {
   switch (draft.kind) {
     case 'grab': {
       const point = locate(before, draft.uv);

@@ -1,6 +1,8 @@
 /** Gives long work on a mesh to the worker, and its results back as promises. */
 import type { MeshBVH } from '../vendor.js';
 import type { BoundaryLine } from './boundary.js';
+import type { VertexNumbers } from './curvature.js';
+import type { StretchCells } from './stretch.js';
 
 /** A mesh: `x, y, z` of each vertex, three vertices of each triangle. */
 export interface PlainMesh {
@@ -11,9 +13,16 @@ export interface PlainMesh {
 /** A tree of bounding boxes in a form that a worker can send. */
 export type SerializedTree = ReturnType<typeof MeshBVH.serialize>;
 
-export type WorkerRequest = PlainMesh & { readonly id: number; readonly job: 'boundary' | 'tree' };
+/** What can be asked of a mesh. */
+type Job =
+  { readonly job: 'boundary' | 'tree' | 'numbers' } | { readonly job: 'stretch'; readonly cells: StretchCells };
+export type WorkerRequest = PlainMesh & { readonly id: number } & Job;
 export type WorkerAnswer = { readonly id: number } & (
-  { readonly lines: BoundaryLine[] } | { readonly tree: SerializedTree } | { readonly error: string }
+  | { readonly lines: BoundaryLine[] }
+  | { readonly tree: SerializedTree }
+  | { readonly numbers: VertexNumbers }
+  | { readonly stretch: Float32Array<ArrayBuffer> }
+  | { readonly error: string }
 );
 
 /** The worker, started at the first job. */
@@ -34,6 +43,18 @@ export class GeometryJobs {
     return 'tree' in answer ? answer.tree : failed(answer);
   }
 
+  /** The curvature of a mesh. Takes the mesh's arrays. */
+  async numbers(mesh: PlainMesh): Promise<VertexNumbers> {
+    const answer = await this.ask({ ...mesh, job: 'numbers' });
+    return 'numbers' in answer ? answer.numbers : failed(answer);
+  }
+
+  /** The stretch of the vertices of a mesh that lie near cells. Takes the mesh's arrays. */
+  async stretch(mesh: PlainMesh, cells: StretchCells): Promise<Float32Array<ArrayBuffer>> {
+    const answer = await this.ask({ ...mesh, job: 'stretch', cells });
+    return 'stretch' in answer ? answer.stretch : failed(answer);
+  }
+
   /** Stops the work that is under way. */
   stop(): void {
     this.worker?.terminate();
@@ -44,7 +65,7 @@ export class GeometryJobs {
     this.waiting.clear();
   }
 
-  private ask(request: Omit<WorkerRequest, 'id'>): Promise<WorkerAnswer> {
+  private ask(request: PlainMesh & Job): Promise<WorkerAnswer> {
     this.worker ??= this.start();
     const id = this.nextId;
     this.nextId += 1;

@@ -1,7 +1,7 @@
 /** From a pointer on the picture to a gesture on the cloth. */
 import type { Uv, Vec3 } from '../client.js';
 import { type ClothPoint, nearestPatch, normalOf, positionOf } from '../model/cloth.js';
-import type { Draft } from '../model/draft.js';
+import { type CutDraft, type Draft, firstMaking, handlesOf, withHandle } from '../model/draft.js';
 import type { Editor } from '../model/editor.js';
 import { Vector3 } from '../vendor.js';
 import type { Hit, Viewer } from './viewer.js';
@@ -19,6 +19,9 @@ const AXES: ReadonlyMap<string, Vector3> = new Map([
   ['z', new Vector3(0, 0, 1)],
 ]);
 
+/** What a pointer that is not on new cloth has of it. */
+const NOT_CLOTH = { cloth: undefined, onPatch: false };
+
 /** A pointer that is down. */
 interface Hold {
   readonly pointer: number;
@@ -27,6 +30,8 @@ interface Hold {
   readonly hit: Hit;
   /** The cloth under it, where the tool needs cloth. */
   readonly cloth: HeldCloth | undefined;
+  /** Which handle of a stretch of border it holds. */
+  readonly part?: number | undefined;
   moved: boolean;
 }
 
@@ -46,6 +51,7 @@ export class Gestures {
   private firstOfPinch: ClothPoint | undefined;
   private heldAxis: string | undefined;
   private radius = 0.125;
+  private firstOfBorder: Vector3 | undefined;
   private readonly listening = new AbortController();
 
   constructor(
@@ -69,10 +75,16 @@ export class Gestures {
     return this.editor.tool === 'pinch' ? this.firstOfPinch : undefined;
   }
 
+  /** The first end of a stretch of border that waits for its second. */
+  get waitingEnd(): Vector3 | undefined {
+    return this.editor.tool === 'border' ? this.firstOfBorder : undefined;
+  }
+
   /** Forgets the gesture that is being made. */
   cancel(): void {
     this.hold = undefined;
     this.firstOfPinch = undefined;
+    this.firstOfBorder = undefined;
     this.editor.dropDraft();
   }
 
@@ -89,15 +101,96 @@ export class Gestures {
     if (tool === 'look' || work !== undefined || event.button !== 0 || !event.isPrimary) {
       return;
     }
+    if (tool === 'border') {
+      this.borderDown(event);
+      return;
+    }
     const hit = this.viewer.pick(event.clientX, event.clientY);
     const cloth = this.held(hit?.cloth);
+    if (tool === 'cut') {
+      this.cutDown(event, hit);
+      return;
+    }
     if (hit === undefined || (cloth === undefined && (tool !== 'anchor' || this.editor.editable.length === 0))) {
       return;
     }
+    this.take(event, { hit, cloth });
+  }
+
+  private take(event: PointerEvent, { hit, cloth, part }: Pick<Hold, 'hit' | 'cloth' | 'part'>): void {
     event.stopImmediatePropagation();
     this.viewer.canvas.focus();
     this.viewer.canvas.setPointerCapture(event.pointerId);
-    this.hold = { pointer: event.pointerId, x: event.clientX, y: event.clientY, hit, cloth, moved: false };
+    this.hold = { pointer: event.pointerId, x: event.clientX, y: event.clientY, hit, cloth, part, moved: false };
+  }
+
+  /** The middle of a cut is where the pointer goes down on the scan; how far it is dragged is the radius. */
+  private cutDown(event: PointerEvent, hit: Hit | undefined): void {
+    if (hit === undefined) {
+      return;
+    }
+    if (hit.onPatch) {
+      event.stopImmediatePropagation();
+      this.editor.say('Only cloth of the scan itself can be cut out.');
+      return;
+    }
+    this.take(event, { hit, cloth: undefined });
+    const { radius } = this.cutDraft();
+    this.editor.preview({ kind: 'cut', center: hit.position.toArray(), radius });
+  }
+
+  private cutDraft(): CutDraft {
+    const { draft, scan } = this.editor;
+    const start = { loops: scan?.loops ?? [], candidates: [] };
+    return draft?.kind === 'cut' ? draft : (firstMaking('cut', start) as CutDraft);
+  }
+
+  /** Takes a handle of the stretch, or begins and ends one at the cloth's edge. */
+  private borderDown(event: PointerEvent): void {
+    const at = { x: event.clientX, y: event.clientY };
+    const { draft } = this.editor;
+    if (draft?.kind === 'border') {
+      const handles = handlesOf(draft).map((handle) => new Vector3(...handle));
+      const held = this.viewer.nearestOf(handles, at, 16);
+      if (held !== undefined) {
+        this.take(event, { hit: { position: held, ...NOT_CLOTH }, cloth: undefined, part: handles.indexOf(held) });
+      }
+      return;
+    }
+    const end = this.viewer.nearestOfBorder(at.x, at.y);
+    if (end === undefined) {
+      return;
+    }
+    this.take(event, { hit: { position: end, ...NOT_CLOTH }, cloth: undefined });
+  }
+
+  /** A click at the cloth's edge: the first end of a stretch, or its second. */
+  private bordered({ hit, moved }: Hold): void {
+    const { draft } = this.editor;
+    if (moved || draft?.kind === 'border') {
+      return;
+    }
+    const first = this.firstOfBorder;
+    if (first === undefined) {
+      this.firstOfBorder = hit.position;
+      this.editor.say('Border: click where the stretch ends.');
+      return;
+    }
+    this.firstOfBorder = undefined;
+    this.editor.say('Border: drag its ends, or mend it.');
+    this.editor.preview({ kind: 'border', from: first.toArray(), to: hit.position.toArray(), along: [] });
+  }
+
+  private movedHandle({ hit, part = 0 }: Hold, { clientX, clientY }: PointerEvent): Draft | undefined {
+    const { draft } = this.editor;
+    if (draft?.kind !== 'border') {
+      return undefined;
+    }
+    const isEnd = part < 2;
+    const target = isEnd
+      ? this.viewer.nearestOfBorder(clientX, clientY)
+      : this.viewer.onScreenPlane(clientX, clientY, hit.position);
+    return target && withHandle(draft, part, target.toArray());
   }
 
   private move(event: PointerEvent): void {
@@ -123,6 +216,10 @@ export class Gestures {
     const { tool } = this.editor;
     if (tool === 'pinch') {
       this.pinched(hold);
+    } else if (tool === 'border') {
+      this.bordered(hold);
+    } else if (tool === 'cut') {
+      this.editor.say('Cut out: change the ball, or cut it out and mend.');
     } else if (tool === 'anchor' && !hold.moved) {
       this.editor.preview(this.anchorAt(hold, hold.hit.position));
       void this.editor.commit();
@@ -143,6 +240,13 @@ export class Gestures {
         const target = this.viewer.onScreenPlane(event.clientX, event.clientY, hold.hit.position);
         return target && this.anchorAt(hold, target);
       }
+      case 'cut': {
+        const edge = this.viewer.onScreenPlane(event.clientX, event.clientY, hold.hit.position);
+        const radius = edge?.distanceTo(hold.hit.position) ?? 0;
+        return radius > 0 ? { kind: 'cut', center: hold.hit.position.toArray(), radius } : undefined;
+      }
+      case 'border':
+        return this.movedHandle(hold, event);
       default:
         return undefined;
     }
@@ -194,6 +298,16 @@ export class Gestures {
   }
 
   private wheel(event: WheelEvent): void {
+    const { draft } = this.editor;
+    if (draft?.kind === 'cut') {
+      const hit = this.viewer.pick(event.clientX, event.clientY);
+      if (hit !== undefined && hit.position.distanceTo(new Vector3(...draft.center)) <= draft.radius) {
+        event.preventDefault();
+        event.stopImmediatePropagation();
+        this.editor.preview({ ...draft, radius: draft.radius * RADIUS.step ** -Math.sign(event.deltaY) });
+      }
+      return;
+    }
     if (this.editor.tool !== 'twist' || this.viewer.pick(event.clientX, event.clientY)?.cloth === undefined) {
       return;
     }
@@ -201,7 +315,6 @@ export class Gestures {
     event.stopImmediatePropagation();
     const radius = this.radius * RADIUS.step ** -Math.sign(event.deltaY);
     this.radius = Math.min(Math.max(radius, RADIUS.least), RADIUS.most);
-    const { draft } = this.editor;
     if (draft?.kind === 'twist') {
       this.editor.preview({ ...draft, radius: this.radius });
     } else {

@@ -1,11 +1,15 @@
-/** Marks of a gesture: the handle under the pointer, the tether to the cloth, the ring of a twist. */
+/** Marks of a gesture: the handle under the pointer, the tether to the cloth, the ring of a twist, the ball of a cut, the stretch of a border. */
 import {
   BufferAttribute,
   BufferGeometry,
+  DoubleSide,
   Group,
   Line,
+  Line2,
   LineBasicMaterial,
+  LineGeometry,
   LineLoop,
+  LineMaterial,
   Mesh,
   MeshBasicMaterial,
   type PerspectiveCamera,
@@ -18,6 +22,12 @@ const HANDLE_RADIUS = 7;
 /** Corners of a ring. */
 const RING_CORNERS = 64;
 
+/** The colours of what a hand holds and of what is taken away. */
+const HAND = 0x0b7285;
+const CUT = 0xc2255c;
+/** The name of the ball of a cut, whose size is the scene's. */
+const BALL = 'cut';
+
 /** What is marked. */
 export interface Marked {
   /** Points that a hand holds. */
@@ -26,18 +36,46 @@ export interface Marked {
   readonly tethers?: readonly (readonly [Vector3, Vector3])[];
   /** A closed line. */
   readonly ring?: readonly Vector3[];
+  /** A ball that shows where it goes through the cloth. */
+  readonly ball?: { readonly center: Vector3; readonly radius: number };
+  /** A broad line. */
+  readonly stretch?: readonly Vector3[];
+  /** A broad dashed line. */
+  readonly dashes?: readonly Vector3[];
 }
 
 /** The marks, drawn over everything. */
 export class Marks {
   readonly group = new Group();
   private readonly ball = new SphereGeometry(1, 24, 16);
-  private readonly ballMaterial = new MeshBasicMaterial({ color: 0x0b7285, depthTest: false, transparent: true });
-  private readonly lineMaterial = new LineBasicMaterial({ color: 0x0b7285, depthTest: false, transparent: true });
+  private readonly ballMaterial = new MeshBasicMaterial({ color: HAND, depthTest: false, transparent: true });
+  private readonly cutMaterial = new MeshBasicMaterial({
+    color: CUT,
+    transparent: true,
+    opacity: 0.35,
+    depthWrite: false,
+    side: DoubleSide,
+  });
+  private readonly lineMaterial = new LineBasicMaterial({ color: HAND, depthTest: false, transparent: true });
 
   /** Shows these marks in place of those before. */
-  show({ handles = [], tethers = [], ring = [] }: Marked): void {
+  show({ handles = [], tethers = [], ring = [], ball, stretch = [], dashes = [] }: Marked): void {
     this.clear();
+    if (ball !== undefined) {
+      const mark = new Mesh(this.ball, this.cutMaterial);
+      mark.position.copy(ball.center);
+      mark.scale.setScalar(ball.radius);
+      mark.name = BALL;
+      this.group.add(mark);
+    }
+    if (stretch.length > 1) {
+      this.group.add(broadLine(stretch, { color: CUT, linewidth: 6 }));
+    }
+    if (dashes.length > 1) {
+      const length = dashes.reduce((sum, point, at) => sum + point.distanceTo(dashes[Math.max(at - 1, 0)] ?? point), 0);
+      const dash = { dashed: true, dashSize: length / 30, gapSize: length / 40 };
+      this.group.add(broadLine(dashes, { color: HAND, linewidth: 3, ...dash }));
+    }
     for (const position of handles) {
       const handle = new Mesh(this.ball, this.ballMaterial);
       handle.position.copy(position);
@@ -54,7 +92,10 @@ export class Marks {
 
   clear(): void {
     for (const mark of this.group.children) {
-      if (mark instanceof Line) {
+      if (mark instanceof Line2) {
+        mark.geometry.dispose();
+        mark.material.dispose();
+      } else if (mark instanceof Line) {
         (mark.geometry as BufferGeometry).dispose();
       }
     }
@@ -65,7 +106,7 @@ export class Marks {
   fit(camera: PerspectiveCamera, height: number): void {
     const perPixel = (2 * Math.tan((camera.fov * Math.PI) / 360)) / Math.max(height, 1);
     for (const mark of this.group.children) {
-      if (mark instanceof Mesh) {
+      if (mark instanceof Mesh && mark.geometry === this.ball && mark.name !== BALL) {
         mark.scale.setScalar(HANDLE_RADIUS * perPixel * camera.position.distanceTo(mark.position));
       }
     }
@@ -82,6 +123,14 @@ export function circle(center: Vector3, normal: Vector3, radius: number): Vector
     const point = center.clone().addScaledVector(first, radius * Math.cos(angle));
     return point.addScaledVector(second, radius * Math.sin(angle));
   });
+}
+
+function broadLine(points: readonly Vector3[], look: ConstructorParameters<typeof LineMaterial>[0]): Line2 {
+  const geometry = new LineGeometry();
+  geometry.setPositions(points.flatMap((point) => point.toArray()));
+  const line = new Line2(geometry, new LineMaterial({ depthTest: false, transparent: true, ...look }));
+  line.computeLineDistances();
+  return line;
 }
 
 function lineGeometry(points: readonly Vector3[]): BufferGeometry {

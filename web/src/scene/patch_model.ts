@@ -15,7 +15,10 @@ import {
   Triangle,
   Vector3,
 } from '../vendor.js';
+import { type VertexNumbers, vertexNumbers } from './curvature.js';
+import { type Heat, type HeatScale, heatColors } from './heat_colors.js';
 import { vectors } from './scan_model.js';
+import { patchStretch } from './stretch.js';
 
 /** The surface of a patch, and the image of its own if it has one. */
 export interface Surface {
@@ -99,7 +102,7 @@ export class PatchModel {
       geometry.getAttribute('position'),
       geometry.getAttribute('normal'),
     ] as BufferAttribute[];
-    const normals = vertexNormals(patch.positions, patch.hole.patchFaces ?? []);
+    const normals = patch.normals ?? vertexNormals(patch.positions, patch.hole.patchFaces ?? []);
     for (const [corner, vertex] of this.corners.entries()) {
       const side = this.sides[corner] as number;
       for (let axis = 0; axis < 3; axis += 1) {
@@ -113,6 +116,27 @@ export class PatchModel {
     (normal as BufferAttribute).needsUpdate = true;
     geometry.computeBoundingSphere();
     geometry.computeBoundingBox();
+  }
+
+  /** The numbers of a heat map, of each patch vertex. */
+  heatValues(heat: Heat): Float32Array {
+    return heat === 'stretch' ? patchStretch(this.patch) : this.numbers().curvature;
+  }
+
+  /** Colours it by a heat map. */
+  paint(scale: HeatScale): void {
+    const colors = heatColors(this.heatValues(scale.heat), this.numbers().shade, scale);
+    const ofCorners = new Float32Array(3 * this.corners.length);
+    for (const [corner, vertex] of this.corners.entries()) {
+      ofCorners.set(colors.subarray(3 * vertex, 3 * vertex + 3), 3 * corner);
+    }
+    this.mesh.geometry.setAttribute('color', vectors(ofCorners));
+  }
+
+  private numbers(): VertexNumbers {
+    const { positions, hole } = this.patch;
+    const vertices = Uint32Array.from({ length: positions.length / 3 }, (_, vertex) => vertex);
+    return vertexNumbers(positions, hole.patchFaces ?? [], vertices);
   }
 
   /** The place of a hit on the mesh; undefined without a chart. */

@@ -1,6 +1,6 @@
 /** Boundary loops as lines: the kind gives the colour and whether a line is solid, dashed or dotted. Chosen ones are wider. */
 import type { Loop } from '../client.js';
-import { styleOf } from '../model/loops.js';
+import { isHole, styleOf } from '../model/loops.js';
 import { Box3, Group, Line2, LineGeometry, LineMaterial, Vector3 } from '../vendor.js';
 import type { BoundaryLine } from './boundary.js';
 
@@ -19,12 +19,15 @@ export class Rims {
   readonly group = new Group();
   private readonly lines = new Map<number, Line2>();
   private readonly views = new Map<number, RimView>();
+  /** Those of the cloth's own edge: of loops that are no holes. */
+  readonly borders: readonly BoundaryLine[];
 
   /**
    * @param lines - The line of each loop by its id.
    * @param size - The scan's size, for the length of dashes.
    */
   constructor(loops: readonly Loop[], lines: ReadonlyMap<number, BoundaryLine>, size: number) {
+    this.borders = loops.flatMap((loop) => (isHole(loop) ? [] : (lines.get(loop.id ?? 0) ?? [])));
     for (const loop of loops) {
       const line = lines.get(loop.id ?? 0);
       if (line === undefined) {

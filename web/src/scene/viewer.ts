@@ -2,7 +2,7 @@
 import type { Loop } from '../client.js';
 import type { ClothPoint } from '../model/cloth.js';
 import { byKind } from '../model/loops.js';
-import type { Patch } from '../model/scan_session.js';
+import type { Dressing, Patch } from '../model/scan_session.js';
 import {
   Box3,
   DirectionalLight,
@@ -19,11 +19,14 @@ import {
   Vector3,
   WebGLRenderer,
 } from '../vendor.js';
+import { stretchBetween, pointsOf } from './border_stretch.js';
 import { linesOfLoops } from './boundary.js';
 import { Marks } from './marks.js';
 import { PatchModel, type Surface, TINT, blendedMaterial, readSurfaces } from './patch_model.js';
 import { Rims } from './rims.js';
-import { ScanModel, type Shading, plainMaterial } from './scan_model.js';
+import { type Heat, type HeatScale, heatColors, scaleOf } from './heat_colors.js';
+import { ScanModel, type Shading, heatOf, plainMaterial } from './scan_model.js';
+import { stretchCells } from './stretch.js';
 
 /** What the person chose to see. */
 export interface Look {
@@ -45,6 +48,8 @@ export interface Hit {
   readonly position: Vector3;
   /** The place on new cloth; undefined on the scan. */
   readonly cloth: ClothPoint | undefined;
+  /** Whether it is on new cloth, with or without a chart. */
+  readonly onPatch: boolean;
 }
 
 /** Draws into a canvas that fills `host`. */
@@ -59,6 +64,14 @@ export class Viewer {
   private scan: ScanModel | undefined;
   private rims: Rims | undefined;
   private patches: PatchModel[] = [];
+  /** The heat map that is drawn. */
+  private heat: HeatScale | undefined;
+  /** The stretch of the scan around the holes of a dressing. */
+  private stretch: { readonly dressing: Dressing | undefined; readonly values: Promise<Float32Array> } | undefined;
+  /** Told what the colours of a heat map mean; with a scale once it is drawn. */
+  onHeat: (heat: Heat | undefined, scale: HeatScale | undefined) => void = () => {};
+  /** Told what could not be computed. */
+  onError: (error: unknown) => void = () => {};
   /** Those that were asked for last; their surfaces may still be read. */
   private wanted: readonly Patch[] = [];
   private look = FIRST_LOOK;
@@ -102,7 +115,8 @@ export class Viewer {
     this.clear();
     this.scan = scan;
     this.scene.add(scan.root);
-    scan.setShading(this.look.shading);
+    scan.setShading(this.shading);
+    this.renewHeat();
     const sphere = scan.bounds.getBoundingSphere(new Sphere());
     this.lookAt(scan.bounds, new Vector3(0.5, 0.5, 1));
     const lines = await scan.boundaryLines();
@@ -136,14 +150,58 @@ export class Viewer {
       }
       if (!this.showsSurfacesOf(this.wanted)) {
         this.replacePatches(surfaces);
+        this.renewHeat();
       }
     }
     this.wanted.forEach((patch, i) => {
-      if (this.patches[i]?.shown !== patch) {
-        this.patches[i]?.update(patch);
+      const model = this.patches[i];
+      if (model !== undefined && model.shown !== patch) {
+        model.update(patch);
+        if (this.heat !== undefined) {
+          model.paint(this.heat);
+        }
       }
     });
     this.draw();
+  }
+
+  /** Takes the scan's triangles out that are cut, by their middles, wherever the new cloth is shown. */
+  showCut(middles: readonly number[]): void {
+    this.scan?.cutOut(middles);
+    this.draw();
+  }
+
+  /** The vertex of the cloth's own edge that is nearest to a point of the window, if one is near. */
+  nearestOfBorder(clientX: number, clientY: number): Vector3 | undefined {
+    const borders = this.rims?.borders ?? [];
+    return this.nearestOf(
+      borders.flatMap(pointsOf).map((point) => new Vector3(...point)),
+      { x: clientX, y: clientY },
+      40,
+    );
+  }
+
+  /** The shorter way along the cloth's own edge between its vertices nearest to two points. */
+  stretchBetween(from: Vector3, to: Vector3): Vector3[] {
+    const stretch = stretchBetween(this.rims?.borders ?? [], from.toArray(), to.toArray());
+    return stretch.map((point) => new Vector3(...point));
+  }
+
+  /** Of some points the one that is drawn nearest to a point of the window, at most so many CSS pixels away. */
+  nearestOf(points: readonly Vector3[], at: { x: number; y: number }, most: number): Vector3 | undefined {
+    const { left, top, width, height } = this.canvas.getBoundingClientRect();
+    this.camera.updateMatrixWorld();
+    let best: { point: Vector3; distance: number } | undefined;
+    const place = new Vector3();
+    for (const point of points) {
+      place.copy(point).project(this.camera);
+      const [x, y] = [left + ((place.x + 1) / 2) * width, top + ((1 - place.y) / 2) * height];
+      const distance = Math.hypot(x - at.x, y - at.y);
+      if (Math.abs(place.z) <= 1 && distance <= Math.min(most, best?.distance ?? most)) {
+        best = { point, distance };
+      }
+    }
+    return best?.point;
   }
 
   /** Changes how things are drawn. */
@@ -152,15 +210,72 @@ export class Viewer {
     this.look = { ...before, ...change };
     this.rims?.setVisible(this.look.outlined);
     if (before.shading !== this.look.shading) {
-      this.scan?.setShading(this.look.shading);
+      this.renewHeat();
     }
     if (before.shading !== this.look.shading || before.tinted !== this.look.tinted) {
-      for (const patch of this.patches) {
-        patch.mesh.material.dispose();
-        patch.mesh.material = this.materialOf(patch.shown, patch.image);
-      }
+      this.renewMaterials();
     }
     this.draw();
+  }
+
+  private renewMaterials(): void {
+    this.scan?.setShading(this.shading);
+    for (const patch of this.patches) {
+      patch.mesh.material.dispose();
+      patch.mesh.material = this.materialOf(patch.shown, patch.image);
+    }
+  }
+
+  /** How surfaces are drawn now: without textures while a heat map is computed. */
+  private get shading(): Shading {
+    const { shading } = this.look;
+    return heatOf(shading) === undefined || this.heat?.heat === shading ? shading : 'shaded';
+  }
+
+  private renewHeat(): void {
+    const { scan } = this;
+    this.showHeat().catch((error) => {
+      // The work on a scan is stopped when another takes its place.
+      if (this.scan === scan) {
+        this.onError(error);
+      }
+    });
+  }
+
+  /** Computes and draws the heat map that was chosen, if one was. */
+  private async showHeat(): Promise<void> {
+    const { scan, look, patches } = this;
+    const heat = heatOf(look.shading);
+    if (heat === undefined || scan === undefined) {
+      this.heat = undefined;
+      this.onHeat(heat, undefined);
+      return;
+    }
+    this.onHeat(heat, this.heat?.heat === heat ? this.heat : undefined);
+    const [{ shade }, values] = await Promise.all([scan.numbers(), this.heatOfScan(heat, scan)]);
+    // Another scan, other holes or another look may have been chosen since.
+    if (this.scan !== scan || heatOf(this.look.shading) !== heat || this.patches !== patches) {
+      return;
+    }
+    this.heat = scaleOf(heat, [values, ...patches.map((patch) => patch.heatValues(heat))]);
+    scan.paint(heatColors(values, shade, this.heat));
+    for (const patch of patches) {
+      patch.paint(this.heat);
+    }
+    this.renewMaterials();
+    this.onHeat(heat, this.heat);
+    this.draw();
+  }
+
+  private async heatOfScan(heat: Heat, scan: ScanModel): Promise<Float32Array> {
+    if (heat === 'curvature') {
+      return (await scan.numbers()).curvature;
+    }
+    const dressing = this.wanted[0]?.dressing;
+    if (this.stretch === undefined || this.stretch.dressing !== dressing) {
+      this.stretch = { dressing, values: scan.stretch(stretchCells(this.wanted)) };
+    }
+    return this.stretch.values;
   }
 
   /** Moves the camera so that all of the scan fills the picture; or one loop, seen from its front. */
@@ -187,9 +302,9 @@ export class Viewer {
     const scan = this.scan?.pick(this.raycaster);
     if (cloth !== undefined && cloth.distance <= (scan?.distance ?? Number.POSITIVE_INFINITY)) {
       const patch = this.patches.find(({ mesh }) => mesh === cloth.object);
-      return { position: cloth.point, cloth: patch?.pointOf(cloth) };
+      return { position: cloth.point, cloth: patch?.pointOf(cloth), onPatch: true };
     }
-    return scan && { position: scan.point, cloth: undefined };
+    return scan && { position: scan.point, cloth: undefined, onPatch: false };
   }
 
   /** Where the pointer's ray meets the plane through a point that faces the camera. */
@@ -245,8 +360,10 @@ export class Viewer {
       this.renderer.setScissor(left, 0, width, height);
     }
     this.patches.forEach(({ mesh }) => (mesh.visible = mended));
+    this.scan?.setCut(mended);
     this.renderer.render(this.scene, this.camera);
     this.patches.forEach(({ mesh }) => (mesh.visible = true));
+    this.scan?.setCut(true);
   }
 
   /** Moves the camera until a box fills the picture. @param from - Direction to look from; zero: the present one. */
@@ -273,8 +390,9 @@ export class Viewer {
   }
 
   private materialOf({ hole }: Patch, image: Texture | null): Material {
-    const { shading, tinted } = this.look;
-    if (tinted) {
+    const { shading } = this;
+    const { tinted } = this.look;
+    if (tinted && heatOf(shading) === undefined) {
       return plainMaterial(TINT, shading);
     }
     if (shading !== 'textured') {
@@ -318,6 +436,8 @@ export class Viewer {
       this.rims.dispose();
     }
     this.scan = undefined;
+    this.heat = undefined;
+    this.stretch = undefined;
     this.rims = undefined;
     this.sphere = undefined;
   }
@@ -333,6 +453,9 @@ export class Viewer {
       const surface = surfaces[i];
       if (surface !== undefined) {
         const model = new PatchModel(patch, surface, this.materialOf(patch, surface.image));
+        if (this.heat !== undefined) {
+          model.paint(this.heat);
+        }
         this.patches.push(model);
         this.scene.add(model.mesh);
       }

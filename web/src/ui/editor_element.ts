@@ -23,7 +23,7 @@ import './look_panel.js';
 import './report_panel.js';
 import { Stage } from './stage.js';
 import { shared } from './styles.js';
-import { TOOLS } from './tools_panel.js';
+import { TOOLS, needsCloth } from './tools_panel.js';
 
 export class EditorElement extends LitElement {
   static override styles = [
@@ -398,7 +398,8 @@ export class EditorElement extends LitElement {
       return;
     }
     const tool = TOOLS.find((it) => it.key.toLowerCase() === key)?.tool;
-    if (tool !== undefined && (tool === 'look' || this.editor.editable.length > 0)) {
+    const usable = this.editor.scan !== undefined && (this.editor.editable.length > 0 || !needsCloth(tool ?? 'look'));
+    if (tool !== undefined && usable) {
       this.editor.setTool(tool);
     } else if (key === 'f') {
       this.stage?.viewer?.frame();

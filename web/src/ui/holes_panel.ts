@@ -1,5 +1,6 @@
 /** The list of boundary loops: which to fill, how long they are, why some are left as they are. */
-import type { Loop } from '../client.js';
+import type { BorderCandidate, Loop, Vec3 } from '../client.js';
+import type { MadeHole } from '../model/constraints.js';
 import { byKind, isFillable, isHole, short, styleOf } from '../model/loops.js';
 import { type TemplateResult, css, html, nothing, svg } from '../vendor.js';
 import { Panel } from './panel.js';
@@ -36,6 +37,16 @@ export class HolesPanel extends Panel {
         gap: 4px;
         margin-bottom: 6px;
       }
+      li.other {
+        grid-template-columns: 1fr auto;
+      }
+      li .name {
+        padding: 0 10px;
+      }
+      li button.back {
+        border-color: var(--line);
+        background: var(--surface);
+      }
       .why {
         grid-column: 2 / -1;
         padding: 0 10px 4px;
@@ -57,7 +68,8 @@ export class HolesPanel extends Panel {
     return html`
       <h2>Holes</h2>
       ${byKind(loops).map(([kind, members]) => this.group(kind, members))}
-      ${holes.length === 0 ? html`<p>This scan has no holes to fill.</p>` : nothing} ${this.doubtful()}
+      ${holes.length === 0 ? html`<p>This scan has no holes to fill.</p>` : nothing} ${this.candidates()} ${this.made()}
+      ${this.doubtful()}
       <div class="row">
         <button class="main" id="mend" ?disabled=${chosen.size === 0 || work !== undefined} @click=${this.mend}>
           Mend ${chosen.size === 1 ? '1 hole' : `${chosen.size} holes`}
@@ -80,6 +92,60 @@ export class HolesPanel extends Panel {
         <input type="checkbox" .checked=${acceptDoubtful} @change=${change} />
         Mend with doubtful cloth, too
       </label>
+    `;
+  }
+
+  /** Bites and rips at the cloth's own edge; choosing one shows it in the border tool. */
+  private candidates(): TemplateResult | typeof nothing {
+    const candidates = this.editor.scan?.candidates ?? [];
+    if (candidates.length === 0) {
+      return nothing;
+    }
+    const show = ({ border }: BorderCandidate): void => {
+      const { from, to } = border ?? {};
+      this.editor.setTool('border');
+      this.editor.preview({ kind: 'border', from: from as Vec3, to: to as Vec3, along: [] });
+    };
+    return html`
+      <h3>Bites and rips at the border (${candidates.length})</h3>
+      <ul aria-label="Bites and rips at the border">
+        ${candidates.map(
+          (candidate, at) => html`
+            <li class="other">
+              <button @click=${() => show(candidate)}>Bite or rip ${at + 1}</button>
+              <span class="quiet small">${short(candidate.mouth)} wide · ${short(candidate.depth)} deep</span>
+            </li>
+          `,
+        )}
+      </ul>
+    `;
+  }
+
+  /** What was cut out or mended at the border, and can be put back. */
+  private made(): TemplateResult | typeof nothing {
+    const { step, work } = this.editor;
+    if (step.made.length === 0) {
+      return nothing;
+    }
+    return html`
+      <h3>Cut out and borders (${step.made.length})</h3>
+      <ul aria-label="Cut out and borders">
+        ${step.made.map(
+          (entry, at) => html`
+            <li class="other">
+              <span class="name">${nameOf(entry)} ✓ mended</span>
+              <button
+                class="back"
+                ?disabled=${work !== undefined}
+                aria-label="Put back ${at + 1}: ${nameOf(entry)}"
+                @click=${() => void this.editor.unmake(entry)}
+              >
+                Put back
+              </button>
+            </li>
+          `,
+        )}
+      </ul>
     `;
   }
 
@@ -146,6 +212,17 @@ export class HolesPanel extends Panel {
   }
 
   private readonly mend = (): void => void this.editor.mend();
+}
+
+function nameOf(entry: MadeHole): string {
+  if ('border' in entry) {
+    return entry.border.auto ? 'All bites and rips' : 'Part of the border';
+  }
+  const { radius, loops, polygon } = entry.cut;
+  if (radius !== undefined) {
+    return `Ball of radius ${short(radius)}`;
+  }
+  return polygon !== undefined ? 'Polygon' : `Edge of ${(loops ?? []).map((loop) => `hole ${loop}`).join(', ')}`;
 }
 
 /** How sure the service is about a kind, and why, where it had to decide between a hole and an opening. */

@@ -7,6 +7,8 @@ const SHADINGS = [
   ['textured', 'Textured'],
   ['shaded', 'Shaded'],
   ['wireframe', 'Wireframe'],
+  ['stretch', 'Stretch'],
+  ['curvature', 'Curvature'],
 ] as const;
 
 /** The event `darn-look` carries what has changed of the look in `detail`. */

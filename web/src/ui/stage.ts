@@ -1,13 +1,16 @@
 /** The picture of the scan as an element: it shows the editor's state, and gives pointers and keys to the gestures. */
 import { marksOf } from '../scene/draft_marks.js';
 import { Gestures } from '../scene/gestures.js';
+import type { Heat, HeatScale } from '../scene/heat_colors.js';
 import { Viewer } from '../scene/viewer.js';
 import { type TemplateResult, css, html } from '../vendor.js';
+import { heatLegend, legendStyles } from './heat_legend.js';
 import { Panel } from './panel.js';
 
 export class Stage extends Panel {
   static override styles = [
     Panel.styles,
+    legendStyles,
     css`
       :host {
         display: block;
@@ -31,6 +34,9 @@ export class Stage extends Panel {
 
   viewer: Viewer | undefined;
   private gestures: Gestures | undefined;
+  /** The heat map that is drawn, and its scale once it is known. */
+  private heat: Heat | undefined;
+  private scale: HeatScale | undefined;
   private readonly opened = (): void => void this.show();
 
   override connectedCallback(): void {
@@ -47,7 +53,8 @@ export class Stage extends Panel {
   }
 
   protected override render(): TemplateResult {
-    return html`<div id="host"></div>`;
+    return html`<div id="host"></div>
+      ${heatLegend(this.heat, this.scale)}`;
   }
 
   protected override firstUpdated(): void {
@@ -62,6 +69,12 @@ export class Stage extends Panel {
       this.editor.report(new Error(`This browser draws no 3-D pictures (WebGL 2): ${String(error)}`));
       return;
     }
+    this.viewer.onError = (error) => this.editor.report(error);
+    this.viewer.onHeat = (heat, scale) => {
+      this.heat = heat;
+      this.scale = scale;
+      this.requestUpdate();
+    };
     const { canvas } = this.viewer;
     canvas.setAttribute('role', 'img');
     canvas.setAttribute(
@@ -79,7 +92,14 @@ export class Stage extends Panel {
   protected override updated(): void {
     this.viewer?.chooseLoops(this.editor.chosen);
     void this.viewer?.showPatches(this.editor.patches);
-    this.viewer?.marks.show(marksOf(this.editor, this.gestures?.waitingPoint));
+    this.viewer?.showCut(this.editor.step.cutFaces);
+    this.viewer?.marks.show(
+      marksOf(this.editor, {
+        cloth: this.gestures?.waitingPoint,
+        border: this.gestures?.waitingEnd,
+        stretch: (from, to) => this.viewer?.stretchBetween(from, to) ?? [],
+      }),
+    );
   }
 
   private async show(): Promise<void> {

@@ -1,7 +1,11 @@
 /** The tools, and the gesture that is being made as numbers: all that a pointer can do can be typed here. */
 import type { Uv, Vec3 } from '../client.js';
+import { middleOf } from '../model/cloth.js';
 import {
   type AnchorDraft,
+  type BorderDraft,
+  type ClothDraft,
+  type CutDraft,
   type Draft,
   type DraftKind,
   type GrabDraft,
@@ -9,8 +13,13 @@ import {
   NAMES,
   type TwistDraft,
   firstDraft,
+  firstMaking,
+  handlesOf,
+  isMaking,
+  withHandle,
 } from '../model/draft.js';
-import type { Tool } from '../model/editor.js';
+import type { Tool } from '../model/editor_state.js';
+import { isHole } from '../model/loops.js';
 import { type TemplateResult, css, html, nothing } from '../vendor.js';
 import { Panel } from './panel.js';
 
@@ -44,9 +53,41 @@ export const TOOLS: readonly { tool: Tool; name: string; key: string; help: stri
     tool: 'anchor',
     name: NAMES.anchor,
     key: 'A',
-    help: 'Drag from the cloth to where it should be, or type the point; the service finds which place of the cloth belongs there.',
+    help: 'Drag from the cloth to where it should be, or type the point; the service finds which place of the cloth belongs there. That place is a dot on the chart, which can be dragged.',
+  },
+  {
+    tool: 'cut',
+    name: NAMES.cut,
+    key: 'C',
+    help: 'For stained, torn or badly scanned cloth: press on its middle and drag to its edge. What the ball touches is cut out, and new cloth is put in. The wheel changes its size.',
+  },
+  {
+    tool: 'border',
+    name: NAMES.border,
+    key: 'E',
+    help: 'For a bite or a rip at the edge of the cloth: click where it begins and where it ends. New cloth goes up to the dashed line; add points where the new hem should go.',
   },
 ];
+
+/** Whether a tool works on new cloth, and so needs some. */
+export function needsCloth(tool: Tool): boolean {
+  return !['look', 'cut', 'border'].includes(tool);
+}
+
+/** What the button of a draft says. */
+const COMMIT: Readonly<Record<DraftKind, string>> = {
+  grab: 'Apply',
+  twist: 'Apply',
+  pinch: 'Apply',
+  anchor: 'Find its place',
+  cut: 'Cut out and mend',
+  border: 'Mend up to the new hem',
+};
+
+/** An anchor that a hand has put on the chart needs no search. */
+function commitWord(draft: Draft): string {
+  return draft.kind === 'anchor' && draft.uv !== undefined ? 'Apply' : COMMIT[draft.kind];
+}
 
 const AXIS_NAMES = ['x', 'y', 'z'] as const;
 
@@ -89,7 +130,7 @@ export class ToolsPanel extends Panel {
               aria-pressed=${it.tool === tool}
               aria-keyshortcuts=${it.key}
               title="${it.name} (${it.key})"
-              ?disabled=${editable.length === 0 && it.tool !== 'look'}
+              ?disabled=${editable.length === 0 && needsCloth(it.tool)}
               @click=${() => this.editor.setTool(it.tool)}
             >
               ${it.name}
@@ -97,16 +138,23 @@ export class ToolsPanel extends Panel {
           `,
         )}
       </div>
-      <p class="quiet small">${editable.length > 0 ? help : noTools(step.patches.length)}</p>
-      ${tool === 'look' || editable.length === 0 ? nothing : this.form(this.draftOf(tool))}
+      <p class="quiet small">${help}</p>
+      ${editable.length > 0 || tool !== 'look' ? nothing : html`<p class="quiet small">${noTools(step.patches.length)}</p>`}
+      ${tool === 'look' ? nothing : this.form(this.draftOf(tool))}
     `;
   }
 
   /** The gesture that is being made, or one that changes nothing yet. */
   private draftOf(kind: DraftKind): Draft | undefined {
-    const { draft, editable } = this.editor;
+    const { draft, editable, scan } = this.editor;
     const [patch] = editable;
-    return draft?.kind === kind ? draft : patch && firstDraft(kind, patch);
+    if (draft?.kind === kind) {
+      return draft;
+    }
+    if (kind === 'cut' || kind === 'border') {
+      return scan && firstMaking(kind, scan);
+    }
+    return patch && firstDraft(kind, patch);
   }
 
   private form(draft: Draft | undefined): TemplateResult | typeof nothing {
@@ -117,25 +165,31 @@ export class ToolsPanel extends Panel {
     const busy = work !== undefined;
     return html`
       <form @submit=${(event: Event) => this.apply(event, draft)}>
-        ${this.holeField(draft)} ${this.fields(draft)}
+        ${isMaking(draft) ? nothing : this.holeField(draft)} ${this.fields(draft)}
         <div class="row wide">
-          <button class="main" ?disabled=${busy}>${draft.kind === 'anchor' ? 'Find its place' : 'Apply'}</button>
+          <button class="main" ?disabled=${busy}>${commitWord(draft)}</button>
           <button type="button" ?disabled=${this.editor.draft === undefined} @click=${() => this.editor.dropDraft()}>
             Cancel
           </button>
-          ${
-            draft.kind === 'anchor'
-              ? html`<button type="button" ?disabled=${busy} @click=${() => this.editor.findAnchor(draft, true)}>
-                  Draw the map
-                </button>`
-              : nothing
-          }
+          ${draft.kind === 'anchor' ? this.mapButton(draft) : nothing}
         </div>
       </form>
     `;
   }
 
-  private holeField(draft: Draft): TemplateResult | typeof nothing {
+  private mapButton(draft: AnchorDraft): TemplateResult {
+    const { work, map } = this.editor;
+    if (map?.isComing) {
+      return html`
+        <button type="button" @click=${() => this.editor.stopMap()}>Stop the map</button>
+        <progress aria-label="The map" max="1" .value=${map.share}></progress>
+      `;
+    }
+    const draw = (): void => void this.editor.drawMap(draft);
+    return html`<button type="button" ?disabled=${work !== undefined} @click=${draw}>Draw the map</button>`;
+  }
+
+  private holeField(draft: ClothDraft): TemplateResult | typeof nothing {
     const patches = this.editor.editable;
     if (patches.length < 2) {
       return nothing;
@@ -167,6 +221,10 @@ export class ToolsPanel extends Panel {
         return this.pinchFields(draft);
       case 'anchor':
         return this.anchorFields(draft);
+      case 'cut':
+        return this.cutFields(draft);
+      case 'border':
+        return this.borderFields(draft);
     }
   }
 
@@ -210,11 +268,64 @@ export class ToolsPanel extends Panel {
       this.preview({ ...draft, hard: (event.target as HTMLInputElement).checked });
     };
     return html`
-      ${this.vectorFields('Point', draft.position, (position) => ({ ...draft, position }))}
+      ${this.vectorFields('Point', draft.position, (position) => ({ ...draft, position }))} ${this.placeFields(draft)}
       <label class="wide check">
         <input type="checkbox" .checked=${draft.hard} @change=${hard} />
         Hard: refuse it where the cloth cannot reach it
       </label>
+    `;
+  }
+
+  /** Where an anchor is on the chart; empty while that is to be searched. */
+  private placeFields(draft: AnchorDraft): TemplateResult[] {
+    const patch = this.editor.editable.find(({ hole }) => hole.id === draft.hole);
+    const place = draft.uv ?? (patch === undefined ? undefined : middleOf(patch)) ?? [0.5, 0.5];
+    return (['u', 'v'] as const).map((name, axis) =>
+      this.number(name, draft.uv?.[axis], (value) => ({ ...draft, uv: place.with(axis, value) as Uv })),
+    );
+  }
+
+  private cutFields(draft: CutDraft): TemplateResult {
+    return html`
+      ${this.vectorFields('Centre', draft.center, (center) => ({ ...draft, center }))}
+      ${this.number('Radius', draft.radius, (radius) => ({ ...draft, radius }))} ${this.cutEdges()}
+    `;
+  }
+
+  /** Cuts the damaged edges of the chosen holes back, so that they are mended from sound cloth. */
+  private cutEdges(): TemplateResult | typeof nothing {
+    const { scan, chosen, work } = this.editor;
+    const loops = (scan?.loops ?? []).filter(isHole).map((loop) => loop.id ?? 0);
+    const holes = loops.filter((id) => chosen.has(id));
+    if (holes.length === 0) {
+      return nothing;
+    }
+    const cut = (): void => void this.editor.make('Cut edges back', { cut: { loops: holes } });
+    return html`
+      <div class="row wide">
+        <button type="button" ?disabled=${work !== undefined} @click=${cut}>Cut the edges of chosen holes back</button>
+      </div>
+    `;
+  }
+
+  private borderFields(draft: BorderDraft): TemplateResult {
+    const { from, to, along } = draft;
+    const middle = [0, 1, 2].map((axis) => ((from[axis] as number) + (to[axis] as number)) / 2) as Vec3;
+    const add = (): void => this.preview({ ...draft, along: [...along, along.at(-1) ?? middle] });
+    const remove = (index: number): void => this.preview({ ...draft, along: along.filter((_, at) => at !== index) });
+    const names = ['From', 'To', ...along.map((_, at) => `Hem ${at + 1}`)];
+    return html`
+      ${handlesOf(draft).map((point, at) =>
+        this.vectorFields(names[at] as string, point, (moved) => withHandle(draft, at, moved)),
+      )}
+      <div class="row wide">
+        <button type="button" @click=${add}>Add a point of the hem</button>
+        ${
+          along.length > 0
+            ? html`<button type="button" @click=${() => remove(along.length - 1)}>Remove the last point</button>`
+            : nothing
+        }
+      </div>
     `;
   }
 
@@ -231,7 +342,7 @@ export class ToolsPanel extends Panel {
     );
   }
 
-  private number(name: string, value: number, change: (value: number) => Draft): TemplateResult {
+  private number(name: string, value: number | undefined, change: (value: number) => Draft): TemplateResult {
     const changed = (event: Event): void => {
       const number = (event.target as HTMLInputElement).valueAsNumber;
       if (Number.isFinite(number)) {
@@ -241,7 +352,13 @@ export class ToolsPanel extends Panel {
     return html`
       <label>
         ${name}
-        <input type="number" step="any" .value=${String(Number(value.toPrecision(6)))} @change=${changed} />
+        <input
+          type="number"
+          step="any"
+          placeholder="found"
+          .value=${value === undefined ? '' : String(Number(value.toPrecision(6)))}
+          @change=${changed}
+        />
       </label>
     `;
   }

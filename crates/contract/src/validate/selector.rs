@@ -75,7 +75,7 @@ impl From<Cut> for v1::Cut {
 }
 
 /// Numbers as a JSON list.
-fn list(numbers: &[f64]) -> pbjson_types::ListValue {
+pub fn list(numbers: &[f64]) -> pbjson_types::ListValue {
     use pbjson_types::value::Kind;
     let value = |x: &f64| pbjson_types::Value {
         kind: Some(Kind::NumberValue(*x)),

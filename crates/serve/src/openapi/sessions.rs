@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use super::{body, found, mended, reference, refused, responses};
-use crate::media_types::{GLB, GLTF, JSON, OCTET_STREAM};
+use crate::media_types::{GLB, GLTF, JSON, NDJSON, OCTET_STREAM};
 
 /// `POST /sessions`.
 pub(super) fn open() -> Value {
@@ -90,13 +90,21 @@ fn draft() -> Value {
 
 /// `POST /sessions/{id}/optimize-anchor`.
 pub(super) fn optimize_anchor() -> Value {
+    let mut found = found();
+    let description = found["description"].as_str().unwrap_or_default();
+    found["description"] = format!(
+        "{description}. With `Accept: application/x-ndjson` the map comes as it is computed, one message a line; it waits while the session is edited, \
+            and ends when the request is closed"
+    )
+    .into();
+    found["content"][NDJSON] = json!({ "schema": reference("AnchorLine") });
     json!({
         "summary": "Find where on the grid of a session's hole a point in space belongs",
         "operationId": "optimizeSessionAnchor",
         "parameters": [id()],
         "requestBody": required(json_body("AnchorQuery", "What to search")),
         "responses": with(
-            responses("200", found(), "A query that cannot be searched; `errors` names its fields"),
+            responses("200", found, "A query that cannot be searched; `errors` names its fields"),
             &SESSION_ERRORS,
         ),
     })

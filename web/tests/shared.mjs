@@ -1,0 +1,38 @@
+// What several tests of the editor do.
+
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { repository } from './browser.mjs';
+
+export const EXAMPLE = readFileSync(join(repository, 'examples/scarf_hole.glb'));
+
+/** What one `POST /inpaint` of the same constraints answers. */
+export async function stateless(service, constraints, scan = EXAMPLE) {
+  const form = new FormData();
+  form.append('scan', new Blob([scan], { type: 'model/gltf-binary' }));
+  form.append('constraints', new Blob([constraints], { type: 'application/json' }));
+  const answer = await fetch(new URL('inpaint', service.url), { method: 'POST', body: form });
+  assert.equal(answer.status, 200);
+  return Buffer.from(await answer.arrayBuffer());
+}
+
+/** The file that "Save the scan" gives. */
+export async function saved(editor, page) {
+  const [download] = await Promise.all([page.waitForEvent('download'), editor.button('Save the scan').click()]);
+  return { name: download.suggestedFilename(), bytes: readFileSync(await download.path()) };
+}
+
+/** Drops a file on the page. */
+export async function drop(page, name, bytes) {
+  const transfer = await page.evaluateHandle(
+    ([fileName, base64]) => {
+      const transfer = new DataTransfer();
+      const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+      transfer.items.add(new File([bytes], fileName));
+      return transfer;
+    },
+    [name, bytes.toString('base64')],
+  );
+  await page.dispatchEvent('darn-editor', 'drop', { dataTransfer: transfer });
+}

@@ -1,0 +1,357 @@
+// Cutting out, borders, heat maps, and the dots and maps of anchors, in a real browser with a real darn.
+
+import assert from 'node:assert/strict';
+import { after, before, test } from 'node:test';
+import axe from 'axe-core';
+import { PATIENCE, openEditor, startBrowser, startService } from './browser.mjs';
+import { sheetWithBite } from './fixtures.mjs';
+import { drop, saved, stateless } from './shared.mjs';
+
+let browser;
+let service;
+
+before(async () => {
+  service = await startService();
+  browser = await startBrowser();
+});
+
+after(async () => {
+  await browser?.close();
+  service?.stop();
+});
+
+/** A test with a page of its own. */
+function inEditor(name, body) {
+  test(name, { timeout: 3 * PATIENCE }, async () => {
+    const editor = await openEditor(browser, service);
+    await body(editor, editor.page);
+    await editor.close();
+  });
+}
+
+/** The constraints of the present step. */
+async function constraintsOf(editor) {
+  return JSON.parse(await editor.model((it) => it.constraintsText()));
+}
+
+/** Axe's complaints. */
+async function complaints(page) {
+  await page.evaluate(axe.source);
+  const { violations } = await page.evaluate('axe.run()');
+  return violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join(' ')}`);
+}
+
+inEditor('damaged cloth is cut out by dragging a ball, mended, undone and put back', async (editor, page) => {
+  await editor.openExample();
+  await editor.mend();
+  await editor.tool('g');
+  await editor.drag(await editor.onCloth(), { x: 30, y: -20 });
+  const before = await editor.picture();
+  const constraints = await constraintsOf(editor);
+
+  await editor.tool('c');
+  // New cloth is none of the scan's.
+  const onCloth = await editor.onCloth();
+  await page.mouse.click(onCloth.x, onCloth.y);
+  await page
+    .getByRole('status')
+    .getByText(/Only cloth of the scan/)
+    .waitFor();
+  assert.equal(await editor.model((it) => it.draft), undefined);
+
+  const damaged = await editor.onCloth(0.03, 0.17);
+  await editor.drag(damaged, { x: 30, y: 0 });
+  const dragged = await editor.model((it) => it.draft);
+  assert.equal(dragged.kind, 'cut');
+  assert.ok((await editor.difference(before, await editor.picture())) > 0.001, 'the ball is seen');
+  await editor.keep('cut-ball');
+  assert.deepEqual(await complaints(page), []);
+  await page.mouse.move(damaged.x, damaged.y);
+  await page.mouse.wheel(0, 100);
+  await page.waitForFunction(
+    (radius) => document.querySelector('darn-editor').editor.draft.radius < radius,
+    dragged.radius,
+  );
+
+  await editor.button('Cut out and mend').click();
+  await editor.idle();
+  assert.equal(await page.getByRole('alert').count(), 0);
+  const cut = await constraintsOf(editor);
+  assert.equal(cut.holes.length, 2);
+  assert.deepEqual(cut.holes[0], { id: 1 });
+  assert.deepEqual(cut.holes[1].cut.center, dragged.center);
+  assert.deepEqual(cut.edits, constraints.edits, 'the grab stays');
+  assert.equal(await editor.model((it) => it.patches.length), 2);
+  await page.getByText(/triangles of the scan were cut out first/).waitFor();
+  await editor.keep('cut-mended');
+  // The damaged cloth is gone from the picture wherever the new cloth is shown, and there where the scan is shown as it was.
+  const taken = () =>
+    page.evaluate(() => {
+      const stage = document.querySelector('darn-editor').shadowRoot.querySelector('darn-stage');
+      const { index } = stage.viewer.scan.meshes[0].geometry;
+      let count = 0;
+      for (let at = 0; at < index.count; at += 3) {
+        count += index.getX(at) === index.getX(at + 1) ? 1 : 0;
+      }
+      return count;
+    });
+  const faces = await editor.model((it) => it.step.report.holes.reduce((sum, hole) => sum + (hole.cut?.faces ?? 0), 0));
+  assert.equal(await taken(), faces);
+  const file = await saved(editor, page);
+  assert.ok(file.bytes.equals(await stateless(service, JSON.stringify(cut))), 'the bytes are those of POST /inpaint');
+
+  await editor.button('Undo').click();
+  await editor.idle();
+  assert.equal(await taken(), 0);
+  await editor.button('Redo').click();
+  await editor.idle();
+  assert.equal(await taken(), faces);
+  await page.getByRole('button', { name: /Put back 1/ }).click();
+  await editor.idle();
+  assert.equal(await taken(), 0);
+  assert.deepEqual(await constraintsOf(editor), constraints);
+});
+
+inEditor('a cut is typed, refused where it cannot be, and changed', async (editor, page) => {
+  await editor.openExample();
+  await page.getByRole('button', { name: 'Cut out', exact: true }).focus();
+  await page.keyboard.press('Enter');
+  await page.getByLabel('Radius').fill('0.000001');
+  await page.getByLabel('Centre x').fill('50');
+  await page.keyboard.press('Enter');
+  await page.getByRole('alert').waitFor();
+  await editor.idle();
+  assert.match(await page.getByRole('alert').textContent(), /cut/);
+  assert.equal(await editor.model((it) => it.draft.center[0]), 50, 'it can be changed');
+  await editor.button('Cancel').focus();
+  await page.keyboard.press('Enter');
+  // The ball that is there at first lies around the hole.
+  await editor.button('Cut out and mend').focus();
+  await page.keyboard.press('Enter');
+  await page
+    .getByRole('status')
+    .getByText(/Cut out: 1 filled/)
+    .waitFor();
+  await editor.idle();
+  const { holes } = await constraintsOf(editor);
+  assert.deepEqual(Object.keys(holes.at(-1).cut), ['center', 'radius']);
+  await editor.button('Undo').click();
+  await editor.button('Cut the edges of chosen holes back').click();
+  await page
+    .getByRole('status')
+    .getByText(/Cut edges back: 1 filled/)
+    .waitFor();
+  assert.deepEqual((await constraintsOf(editor)).holes, [{ id: 1 }, { cut: { loops: [1] } }]);
+});
+
+inEditor('a bite at the border is shown, mended up to a new hem, and its hem is moved', async (editor, page) => {
+  const scan = sheetWithBite();
+  await drop(page, 'bite.glb', scan);
+  await page.getByText('Bites and rips at the border (1)').waitFor();
+  await editor.idle();
+  const open = await editor.picture();
+  await page.getByRole('button', { name: 'Bite or rip 1' }).click();
+  await editor.idle();
+  assert.ok((await editor.difference(open, await editor.picture())) > 0.0005, 'the stretch is seen');
+  await editor.keep('border-stretch');
+  assert.deepEqual(await complaints(page), []);
+  await editor.button('Mend up to the new hem').click();
+  await editor.idle();
+  assert.equal(await page.getByRole('alert').count(), 0);
+  await editor.keep('border-mended');
+  assert.ok((await editor.difference(open, await editor.picture())) > 0.005, 'new cloth is seen');
+  const { holes } = await constraintsOf(editor);
+  assert.equal(holes.length, 1);
+  assert.equal(holes[0].border.from.length, 3);
+  const bytes = (await saved(editor, page)).bytes;
+  assert.ok(bytes.equals(await stateless(service, JSON.stringify({ holes }), scan)));
+  await editor.button('Undo').click();
+  await editor.idle();
+
+  // The same by hand: two clicks at the edge, and a point of the hem typed.
+  const places = await page.evaluate(() => {
+    const { shadowRoot } = document.querySelector('darn-editor');
+    const { viewer } = shadowRoot.querySelector('darn-stage');
+    const [{ border }] = document.querySelector('darn-editor').editor.scan.candidates;
+    const { left, top, width, height } = viewer.canvas.getBoundingClientRect();
+    const Vector = viewer.camera.position.constructor;
+    return [border.from, border.to].map((point) => {
+      const { x, y } = new Vector(...point).project(viewer.camera);
+      return { x: left + ((x + 1) / 2) * width, y: top + ((1 - y) / 2) * height };
+    });
+  });
+  await editor.tool('e');
+  for (const { x, y } of places) {
+    await page.mouse.click(x, y);
+  }
+  const draft = await editor.model((it) => it.draft);
+  assert.equal(draft.kind, 'border');
+  const near = (a, b) => a.every((value, axis) => Math.abs(value - b[axis]) < 0.06);
+  assert.ok(near(draft.from, holes[0].border.from) && near(draft.to, holes[0].border.to));
+  await editor.button('Add a point of the hem').click();
+  await page.getByLabel('Hem 1 z').fill('0.05');
+  await page.keyboard.press('Tab');
+  assert.equal(await editor.model((it) => it.draft.along[0][2]), 0.05);
+  // Its handle is dragged, too.
+  const handle = { x: (places[0].x + places[1].x) / 2, y: (places[0].y + places[1].y) / 2 };
+  const before = await editor.model((it) => it.draft.along[0]);
+  const at = await page.evaluate(() => {
+    const { viewer } = document.querySelector('darn-editor').shadowRoot.querySelector('darn-stage');
+    const { left, top, width, height } = viewer.canvas.getBoundingClientRect();
+    const Vector = viewer.camera.position.constructor;
+    const { x, y } = new Vector(...document.querySelector('darn-editor').editor.draft.along[0]).project(viewer.camera);
+    return { x: left + ((x + 1) / 2) * width, y: top + ((1 - y) / 2) * height };
+  });
+  assert.ok(Math.hypot(at.x - handle.x, at.y - handle.y) < 60);
+  await editor.drag(at, { x: 0, y: 8 });
+  assert.notDeepEqual(await editor.model((it) => it.draft.along[0]), before);
+  await editor.keep('border-hem');
+  await page.keyboard.press('Escape');
+  assert.equal(await editor.model((it) => it.draft), undefined);
+});
+
+inEditor(
+  'stretch and curvature are shown as colours with a legend, by keyboard, and follow the cloth',
+  async (editor, page) => {
+    await editor.openExample();
+    const textured = await editor.picture();
+    await page.getByRole('radio', { name: 'Textured' }).focus();
+    for (const key of ['ArrowDown', 'ArrowDown', 'ArrowDown', 'ArrowDown']) {
+      await page.keyboard.press(key);
+    }
+    assert.equal(await page.getByRole('radio', { name: 'Curvature' }).isChecked(), true);
+    const legend = page.getByRole('group', { name: 'Legend: Curvature' });
+    await legend.waitFor();
+    assert.match(await legend.textContent(), /saddle, −\d.*dome, \d/s);
+    await editor.idle();
+    assert.ok((await editor.difference(textured, await editor.picture())) > 0.02);
+    await editor.mend();
+    await editor.idle();
+    await editor.keep('heat-curvature');
+    const mended = await editor.picture();
+    await editor.tool('g');
+    await editor.drag(await editor.onCloth(), { x: 40, y: -40 });
+    await editor.keep('heat-curvature-grab');
+    assert.ok((await editor.difference(mended, await editor.picture())) > 0.002, 'the colours follow the cloth');
+    const curvature = await editor.picture();
+
+    await page.getByRole('radio', { name: 'Stretch' }).check();
+    await page.getByRole('group', { name: 'Legend: Stretch' }).waitFor();
+    await editor.idle();
+    assert.ok((await editor.difference(curvature, await editor.picture())) > 0.02);
+    await editor.keep('heat-stretch');
+    assert.deepEqual(await complaints(page), []);
+    // The numbers behind the colours are those of the report.
+    const stretch = await page.evaluate(() => {
+      const { viewer } = document.querySelector('darn-editor').shadowRoot.querySelector('darn-stage');
+      const values = viewer.patches[0].heatValues('stretch');
+      return values.reduce((sum, value) => sum + value, 0) / values.length;
+    });
+    const said = await editor.model((it) => it.step.report.holes[0].patch.stretchMean);
+    assert.ok(Math.abs(stretch - said) < 0.03, `${stretch} and ${said}`);
+
+    await editor.button('Undo').click();
+    await page.getByRole('radio', { name: 'Textured' }).check();
+    await page.getByLabel('New cloth in its own colour').check();
+    await editor.button('Undo').click();
+    await editor.idle();
+    assert.equal(await page.getByRole('group', { name: /Legend/ }).count(), 0);
+    assert.ok((await editor.difference(textured, await editor.picture())) < 0.002, 'the scan looks as it did');
+  },
+);
+
+inEditor(
+  'the dot of an anchor is dragged on the chart, the cloth follows, and arrow keys move it',
+  async (editor, page) => {
+    await editor.openExample();
+    await editor.mend();
+    await editor.tool('a');
+    await editor.drag(await editor.onCloth(), { x: 20, y: -25 });
+    await page.getByText(/The point belongs at u/).waitFor();
+    const [placed] = (await constraintsOf(editor)).anchors;
+    const dot = page.getByRole('slider', { name: 'Anchor 1 on the chart' });
+    await dot.scrollIntoViewIfNeeded();
+    const box = await dot.boundingBox();
+    assert.ok(box.width >= 24 && box.height >= 24);
+    const before = await editor.picture();
+
+    let [inFlight, most, sent] = [0, 0, 0];
+    await page.route('**/inpaint*', async (route) => {
+      inFlight += 1;
+      sent += 1;
+      most = Math.max(most, inFlight);
+      await new Promise((resolve) => setTimeout(resolve, 50));
+      inFlight -= 1;
+      await route.continue();
+    });
+    const from = { x: box.x + box.width / 2, y: box.y + box.height / 2 };
+    await editor.drag(
+      from,
+      { x: 25, y: 10 },
+      {
+        steps: 20,
+        held: async () => {
+          await page.waitForFunction(() => document.querySelector('darn-editor').editor.draftPatches !== undefined);
+          await editor.idle();
+          assert.ok((await editor.difference(before, await editor.picture())) > 0.0005, 'the cloth follows the dot');
+          await editor.keep('dot-held');
+        },
+      },
+    );
+    assert.equal(most, 1, 'one request at a time');
+    assert.ok(sent > 1 && sent <= 22, `${sent} requests`);
+    await page.unrouteAll({ behavior: 'wait' });
+    const [moved] = (await constraintsOf(editor)).anchors;
+    assert.deepEqual(moved.position, placed.position);
+    assert.ok(moved.uv[0] > placed.uv[0] + 0.03 && moved.uv[1] < placed.uv[1]);
+    assert.equal(await editor.model((it) => it.step.label), 'Move anchor');
+
+    await dot.focus();
+    await page.keyboard.press('ArrowLeft');
+    await page.keyboard.press('Shift+ArrowUp');
+    assert.match(await dot.getAttribute('aria-valuetext'), /^u 0\.\d+, v 0\.\d+$/);
+    await page.keyboard.press('Enter');
+    await editor.idle();
+    const [typed] = (await constraintsOf(editor)).anchors;
+    assert.ok(
+      Math.abs(typed.uv[0] - moved.uv[0] + 1 / 64) < 1e-9 && Math.abs(typed.uv[1] - moved.uv[1] - 1 / 256) < 1e-9,
+    );
+    assert.deepEqual(await complaints(page), []);
+    await editor.button('Undo').click();
+    await editor.button('Undo').click();
+    assert.deepEqual((await constraintsOf(editor)).anchors, [placed]);
+  },
+);
+
+inEditor('a map is drawn while its cells come, does not hold up a drag, and can be stopped', async (editor, page) => {
+  await editor.openExample();
+  await editor.mend();
+  await editor.tool('a');
+  // The cloth is dragged while the map comes, over and over: no cell may come between.
+  await page.getByLabel('Point y').fill('-0.1');
+  await page.keyboard.press('Tab');
+  await editor.button('Draw the map').click();
+  await page.waitForFunction(() => document.querySelector('darn-editor').editor.map?.share > 0);
+  const rects = page.locator('darn-chart rect');
+  assert.ok((await rects.count()) > 0);
+  await editor.button('Stop the map').click();
+  const share = await editor.model((it) => it.map.share);
+  assert.ok(share < 1, `${share}`);
+  await page.waitForTimeout(300);
+  assert.equal(await editor.model((it) => it.map.share), share, 'no more cells come');
+  assert.equal(await page.getByRole('alert').count(), 0);
+  assert.equal(await rects.count(), await editor.model((it) => it.map.losses.filter((loss) => loss !== null).length));
+  await editor.keep('map-stopped');
+
+  await editor.button('Draw the map').click();
+  await page.waitForFunction(() => document.querySelector('darn-editor').editor.map?.share > 0);
+  await editor.tool('g');
+  await editor.drag(await editor.onCloth(), { x: 40, y: -20 }, { steps: 20 });
+  assert.equal((await constraintsOf(editor)).edits.length, 1);
+  await editor.tool('a');
+  await page.waitForFunction(() => document.querySelector('darn-editor').editor.map.share === 1);
+  const cells = await editor.model((it) => it.map.losses.filter((loss) => loss !== null).length);
+  assert.equal(await rects.count(), cells);
+  await editor.button('Undo').click();
+  assert.equal(await rects.count(), 0);
+});
