@@ -46,6 +46,7 @@ mod port;
 mod prepare;
 mod prepared_hole;
 mod sampled_grid;
+mod scan_additions;
 mod scan_holes;
 mod scan_notes;
 mod scan_search;

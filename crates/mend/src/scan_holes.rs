@@ -11,13 +11,13 @@ use crate::addition::PatchSource;
 use crate::border;
 use crate::context::{HoleContext, Pace};
 use crate::cut::CutScan;
-use crate::digests;
 use crate::error::MendError;
 use crate::fill_hole::PatchDraft;
 use crate::hole_report::FilledHole;
 use crate::inpainter::Inpainter;
 use crate::mender::{Call, NetworkMender};
 use crate::prepared_hole::PreparedHole;
+use crate::scan_additions::ScanAdditions;
 use crate::scan_notes;
 use crate::scan_search::searched_hole;
 use crate::select::{HoleRequest, Selection};
@@ -29,7 +29,7 @@ use crate::welded_scan::WeldedScan;
 use darn_budget::Budget;
 use darn_contract::port::Mended;
 use darn_contract::{Constraints, FieldError, HoleSelector, Search, TextureChoice, v1};
-use darn_gltf_scan::{PatchPrimitive, Scan};
+use darn_gltf_scan::Scan;
 
 /// A scan's holes, prepared.
 pub struct ScanHoles {
@@ -76,37 +76,6 @@ pub struct ColouredPatches {
     pub dressed_ms: f64,
     /// Milliseconds of their textures.
     pub texture_ms: f64,
-}
-
-/// What a request adds to a scan.
-struct ScanAdditions {
-    /// The patches, in order of id.
-    primitives: Vec<PatchPrimitive>,
-    /// The report, without what writing adds.
-    report: v1::Report,
-}
-
-impl ScanAdditions {
-    /// The mended scan; `seen` is the scan without what the request cut out.
-    ///
-    /// # Errors
-    /// When the patches cannot be written; `Exhausted`.
-    fn written(mut self, scan: &Scan, seen: &Scan, call: Call) -> Result<Mended, MendError> {
-        let started = Instant::now();
-        call.budget.begin("writing", 0);
-        let written = seen.write_within(&self.primitives, call.budget)?;
-        self.report.input = Some(digests::message(scan.digests().clone()));
-        self.report.output = Some(digests::message(written.digests));
-        if let Some(timings) = &mut self.report.timings {
-            timings.write = milliseconds(started);
-            timings.total += timings.write;
-        }
-        Ok(Mended {
-            bytes: written.bytes,
-            media_type: scan.container().media_type(),
-            report: self.report,
-        })
-    }
 }
 
 impl ScanHoles {

@@ -1,0 +1,42 @@
+//! What a request adds to a scan, and how it is written.
+
+use std::time::Instant;
+
+use crate::digests;
+use crate::error::MendError;
+use crate::mender::Call;
+use crate::timings::milliseconds;
+use darn_contract::port::Mended;
+use darn_contract::v1;
+use darn_gltf_scan::{PatchPrimitive, Scan};
+
+/// What a request adds to a scan.
+pub struct ScanAdditions {
+    /// The patches, in order of id.
+    pub primitives: Vec<PatchPrimitive>,
+    /// The report, without what writing adds.
+    pub report: v1::Report,
+}
+
+impl ScanAdditions {
+    /// The mended scan; `seen` is the scan without what the request cut out.
+    ///
+    /// # Errors
+    /// When the patches cannot be written; `Exhausted`.
+    pub fn written(mut self, scan: &Scan, seen: &Scan, call: Call) -> Result<Mended, MendError> {
+        let started = Instant::now();
+        call.budget.begin("writing", 0);
+        let written = seen.write_within(&self.primitives, call.budget)?;
+        self.report.input = Some(digests::message(scan.digests().clone()));
+        self.report.output = Some(digests::message(written.digests));
+        if let Some(timings) = &mut self.report.timings {
+            timings.write = milliseconds(started);
+            timings.total += timings.write;
+        }
+        Ok(Mended {
+            bytes: written.bytes,
+            media_type: scan.container().media_type(),
+            report: self.report,
+        })
+    }
+}
