@@ -46,7 +46,7 @@ await editor.drag(from, { x: -60, y: -40 });
 await page.getByText(/The point belongs at u/).waitFor();
 await editor.button('Draw the map').click();
 await page.getByRole('status').getByText('The map is complete.').waitFor();
-await page.getByText(/The point belongs at u/).scrollIntoViewIfNeeded();
+await page.getByRole('heading', { name: /Chart of hole/ }).evaluate((heading) => heading.scrollIntoView());
 await picture('map');
 await page.getByLabel('Outlines').check();
 await page.getByRole('button', { name: /Show Hole 1/ }).click();
