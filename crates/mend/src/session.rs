@@ -215,7 +215,7 @@ impl<'a> SessionCall<'a> {
         self.session.holes.search(search, self.call)
     }
 
-    /// Some cells of the map of a search: see [`map_piece`](crate::context::HoleContext::map_piece).
+    /// Some cells of the map of a search, a forward pass each.
     ///
     /// # Errors
     /// As [`SessionCall::optimize_anchor`].
