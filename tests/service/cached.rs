@@ -1,11 +1,10 @@
 //! Entity tags, and answers that are kept for requests that come again.
 
 use reqwest::Response;
-use serde_json::Value;
 
 use crate::{
     fake::{Behaviour, FakeScan},
-    harness::{Service, until},
+    harness::{Service, until_state},
 };
 
 fn header(answer: &Response, name: &str) -> Option<String> {
@@ -99,11 +98,7 @@ async fn a_result_that_the_client_has_is_not_sent_again() {
         .await
         .unwrap();
     let job = header(&answer, "location").unwrap();
-    until(async || {
-        let answer = service.get(&job).send().await.unwrap();
-        answer.json::<Value>().await.unwrap()["state"] == "DONE"
-    })
-    .await;
+    until_state(&service, &job, "DONE").await;
     let result = format!("{job}/result");
     let first = service.get(&result).send().await.unwrap();
     let tag = header(&first, "etag").unwrap();

@@ -184,3 +184,16 @@ pub async fn problem(response: Response) -> Value {
     assert_eq!(problem["status"], status);
     problem
 }
+
+/// A job, by its path.
+pub async fn job(service: &Service, path: &str) -> Value {
+    let answer = service.get(path).send().await.unwrap();
+    assert_eq!(answer.status(), 200);
+    answer.json().await.unwrap()
+}
+
+/// A job once it is in a state.
+pub async fn until_state(service: &Service, path: &str, state: &str) -> Value {
+    until(|| async { job(service, path).await["state"] == state }).await;
+    job(service, path).await
+}

@@ -13,7 +13,7 @@ use tempfile::TempDir;
 use tokio::io::AsyncWriteExt as _;
 
 use crate::fake::FakeScan;
-use crate::harness::{Service, problem, until};
+use crate::harness::{Service, job, problem, until};
 
 /// Bytes of a large scan: many times what may be in memory.
 const LARGE: usize = 24 << 20;
@@ -160,14 +160,7 @@ async fn a_scan_is_the_same_however_it_comes() {
         assert_eq!(answer.status(), 202, "{kind}");
         let path = answer.headers()["location"].to_str().unwrap().to_owned();
         until(|| async {
-            let job: Value = service
-                .get(&path)
-                .send()
-                .await
-                .unwrap()
-                .json()
-                .await
-                .unwrap();
+            let job = job(&service, &path).await;
             assert_ne!(job["state"], "ERROR", "{kind}: {job}");
             job["state"] == "DONE"
         })

@@ -11,7 +11,7 @@ use tempfile::TempDir;
 use tokio::time::timeout;
 
 use crate::fake::{Behaviour, FakeScan};
-use crate::harness::{Service, problem, until};
+use crate::harness::{Service, job, problem, until, until_state};
 
 /// A service that keeps jobs in a folder.
 async fn service(folder: &TempDir, settings: &[&str]) -> Service {
@@ -38,17 +38,6 @@ async fn accepted(request: RequestBuilder) -> String {
     let job: Value = answer.json().await.unwrap();
     assert_eq!(format!("/jobs/{}", job["id"].as_str().unwrap()), path);
     path
-}
-
-async fn job(service: &Service, path: &str) -> Value {
-    let answer = service.get(path).send().await.unwrap();
-    assert_eq!(answer.status(), 200);
-    answer.json().await.unwrap()
-}
-
-async fn until_state(service: &Service, path: &str, state: &str) -> Value {
-    until(|| async { job(service, path).await["state"] == state }).await;
-    job(service, path).await
 }
 
 async fn send(service: &Service, method: Method, path: &str) -> Response {

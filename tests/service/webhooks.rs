@@ -8,7 +8,7 @@ use tempfile::TempDir;
 use tokio::time::timeout;
 
 use crate::fake::{Behaviour, FakeScan};
-use crate::harness::{Service, problem, until};
+use crate::harness::{Service, job, problem, until, until_state};
 use crate::keyed::{Keyed, entry, limited};
 use crate::webhook_sink::{Reply, Sink};
 
@@ -61,8 +61,7 @@ async fn hand_over(service: &Service, url: &str, scan: impl Into<FakeScan>) -> S
 }
 
 async fn webhook(service: &Service, path: &str) -> Value {
-    let answer = service.get(path).send().await.unwrap();
-    answer.json::<Value>().await.unwrap()["webhook"].clone()
+    job(service, path).await["webhook"].clone()
 }
 
 /// Waits until a job's webhook is so.
@@ -135,18 +134,7 @@ async fn the_end_of_a_job_is_told_and_signed() {
     assert_eq!(service.metric("darn_webhooks_waiting").await, Some(0.0));
     // Nobody is told of a job that names no webhook.
     let silent = accepted(with_scan(service.post("/jobs"), "cloth")).await;
-    until(|| async {
-        let job: Value = service
-            .get(&silent)
-            .send()
-            .await
-            .unwrap()
-            .json()
-            .await
-            .unwrap();
-        job["state"] == "DONE"
-    })
-    .await;
+    until_state(&service, &silent, "DONE").await;
     assert_eq!(webhook(&service, &silent).await, Value::Null);
     assert_eq!(sink.received().len(), 3);
 }
@@ -249,18 +237,7 @@ async fn a_receiver_that_answers_410_hears_no_more_of_the_job() {
     assert_eq!(told.get("nextTryAt"), None);
     let retried = service.post(&format!("{job}/retry")).send().await.unwrap();
     assert_eq!(retried.status(), 200);
-    until(|| async {
-        let shown: Value = service
-            .get(&job)
-            .send()
-            .await
-            .unwrap()
-            .json()
-            .await
-            .unwrap();
-        shown["state"] == "ERROR"
-    })
-    .await;
+    until_state(&service, &job, "ERROR").await;
     // Another one is told nevertheless, and by then this one would have been.
     let other = hand_over(&service, &sink.url("/other"), "cloth").await;
     until_told(&service, &other, |it| it["state"] == "DISABLED").await;
