@@ -27,6 +27,8 @@ COPY examples examples
 COPY web/dist web/dist
 COPY crates crates
 COPY src src
+# What `GET /info` calls the commit: docker build --build-arg DARN_COMMIT=$(git rev-parse HEAD)
+ARG DARN_COMMIT
 RUN cargo build --release --locked --bin darn
 
 # --- run: the binary with its weights built in, glibc, and a user that is not root

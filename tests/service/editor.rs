@@ -81,6 +81,12 @@ async fn info_says_the_limits_of_the_settings() {
         .await
         .unwrap();
     assert_eq!(info["version"], env!("CARGO_PKG_VERSION"));
+    assert_eq!(info["build"]["architecture"], std::env::consts::ARCH);
+    assert_eq!(info["weights"][0]["name"], "fake");
+    assert_eq!(
+        info["weights"][0]["sha256"].as_str().map(str::len),
+        Some(64)
+    );
     let limits = &info["limits"];
     assert_eq!(limits["bodyBytes"], 3 << 20);
     assert_eq!(limits["deadlineSeconds"], 9.0);

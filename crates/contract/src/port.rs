@@ -114,6 +114,9 @@ pub trait Mender: Send + Sync + 'static {
         budget: &Budget<'_>,
     ) -> Result<v1::HolesReport, Refusal>;
 
+    /// The weights that it has loaded, those of requests that name none first.
+    fn weights(&self) -> Vec<v1::Weights>;
+
     /// Mends one small scan completely. The service is ready once it has succeeded.
     ///
     /// # Errors

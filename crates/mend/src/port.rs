@@ -137,6 +137,17 @@ impl Mender for SharedMender {
         })
     }
 
+    fn weights(&self) -> Vec<v1::Weights> {
+        self.0
+            .networks
+            .cards()
+            .map(|card| v1::Weights {
+                name: card.name.clone(),
+                sha256: card.sha256.clone(),
+            })
+            .collect()
+    }
+
     fn warm_up(&self) -> Result<(), Refusal> {
         self.inpaint(
             Bytes::from_static(EXAMPLE),

@@ -1,6 +1,7 @@
 //! The networks that a service has loaded, by name.
 
 use crate::network::Network;
+use crate::weights::WeightsCard;
 use std::time::Duration;
 
 /// Loaded networks; at least one.
@@ -31,6 +32,11 @@ impl Networks {
     /// All names, that of the default first.
     pub fn names(&self) -> Vec<&str> {
         self.all().map(|n| n.card().name.as_str()).collect()
+    }
+
+    /// All cards, that of the default first.
+    pub fn cards(&self) -> impl Iterator<Item = &WeightsCard> {
+        self.all().map(Network::card)
     }
 
     /// Frees what calls left for later calls, if no call has used it for so long.

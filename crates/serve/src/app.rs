@@ -35,6 +35,7 @@ use super::{
 };
 use darn_budget::{Budget, Limits, MemoryPool};
 use darn_contract::port::{Mender, Refusal};
+use darn_contract::v1;
 
 /// Work that a request may cost for each byte of its scan, in nanoseconds of one core. Mends of real scans take up to 1,500.
 const WORK_PER_BYTE: u64 = 40_000;
@@ -149,11 +150,11 @@ impl App {
             None => None,
         };
         let keys = match &settings.keys {
-            Some(path) => Some(KeyRing::open(path).await?),
+            Some(path) => Some(KeyRing::open(path)?),
             None => None,
         };
         let certificate = match settings.tls_files() {
-            Some(files) => Some(ServedCertificate::open(files, settings.tls_handshake).await?),
+            Some(files) => Some(ServedCertificate::open(files, settings.tls_handshake)?),
             None => None,
         };
         let metrics = Metrics::new().map_err(std::io::Error::other)?;
@@ -207,6 +208,11 @@ impl App {
             warm: AtomicBool::new(false),
             draining: AtomicBool::new(false),
         }))
+    }
+
+    /// The weights that are loaded, those of requests that name none first.
+    pub fn weights(&self) -> Vec<v1::Weights> {
+        self.mender.weights()
     }
 
     /// Runs the mender's warm-up on a worker; after it the service is ready. An hour's deadline: the first mend on a machine may be slow.

@@ -2,27 +2,20 @@
 
 use std::{
     collections::HashMap,
-    fmt, fs, io,
+    fmt, io,
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
-    time::{Duration, SystemTime},
+    sync::Arc,
+    time::SystemTime,
 };
-
-use tokio::{task, time};
-use tracing::{error, info};
 
 use super::{
     key_file::{Expiry, KeyEntry, KeyFile, KeyId, KeyLimits, Scope},
     key_secret::{Secret, SecretDigest},
     quota::Usage,
+    watched_files::{Watched, WatchedSource, read_file},
     webhook::WebhookSecrets,
 };
 use darn_jobs::RunningLimits;
-
-/// How often the file is looked at.
-const LOOK_EVERY: Duration = Duration::from_secs(1);
-/// Most bytes of the file: some 5,000 keys, which are all compared with the secret of each request.
-const MAX_FILE_BYTES: u64 = 1 << 20;
 
 /// Why a file of keys cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -108,73 +101,69 @@ impl fmt::Debug for Key {
 
 /// All keys of a service.
 #[derive(Debug)]
-pub struct KeyRing {
-    path: PathBuf,
-    state: Mutex<State>,
-}
+pub struct KeyRing(Watched<KeysFile>);
 
+/// The file of the keys.
 #[derive(Debug)]
-struct State {
-    keys: Arc<[Arc<Key>]>,
+struct KeysFile(PathBuf);
+
+/// What the file says.
+#[derive(Debug)]
+struct Keys {
+    all: Arc<[Arc<Key>]>,
     /// Most jobs that may run of each key that has such a limit.
     running_limits: Arc<RunningLimits>,
-    /// The file as it was seen last, valid or not; `None` when it could not be read.
-    seen: Option<Vec<u8>>,
+}
+
+impl WatchedSource for KeysFile {
+    type Value = Keys;
+    type Error = KeyFileError;
+    const READ_AGAIN: &'static str = "keys read again";
+    const STAYS: &'static str = "the keys stay as they are";
+
+    fn texts(&self) -> Result<Vec<Vec<u8>>, KeyFileError> {
+        let text = read_file(&self.0).map_err(|source| KeyFileError::Unreadable {
+            path: self.0.clone(),
+            source,
+        })?;
+        Ok(vec![text])
+    }
+
+    /// Those that were among the keys before go on with what they have used.
+    fn value(&self, texts: &[Vec<u8>], before: Option<&Keys>) -> Result<Keys, KeyFileError> {
+        let file = KeyFile::parse(&texts.concat()).map_err(|detail| KeyFileError::Invalid {
+            path: self.0.clone(),
+            detail,
+        })?;
+        let KeyFile { defaults, keys } = file;
+        let before = before.map_or(&[][..], |before| &before.all);
+        let before: HashMap<&KeyId, &Arc<Usage>> =
+            before.iter().map(|key| (&key.id, &key.usage)).collect();
+        let keys = keys.0.into_iter().map(|entry| {
+            let usage = before.get(&entry.id).copied().cloned().unwrap_or_default();
+            Arc::new(Key::of(entry, defaults, usage))
+        });
+        let all: Arc<[Arc<Key>]> = keys.collect();
+        Ok(Keys {
+            running_limits: Arc::new(running_limits(&all)),
+            all,
+        })
+    }
 }
 
 impl KeyRing {
-    /// Reads the keys of a file.
+    /// Reads the keys of a file; blocks.
     ///
     /// # Errors
     /// See [`KeyFileError`].
-    pub async fn open(path: &Path) -> Result<Arc<Self>, KeyFileError> {
-        let text = read(path.to_owned()).await?;
-        let keys = keys_of(path, &text, &[])?;
-        let running_limits = Arc::new(running_limits(&keys));
-        Ok(Arc::new(Self {
-            path: path.to_owned(),
-            state: Mutex::new(State {
-                keys,
-                running_limits,
-                seen: Some(text),
-            }),
-        }))
+    pub fn open(path: &Path) -> Result<Arc<Self>, KeyFileError> {
+        let watched = Watched::open(KeysFile(path.to_owned()))?;
+        Ok(Arc::new(Self(watched)))
     }
 
     /// Reads the file again whenever it changes; never ends. A file that cannot be used leaves the keys as they are, and the log says why.
     pub async fn watch(self: Arc<Self>) {
-        let mut tick = time::interval(LOOK_EVERY);
-        loop {
-            tick.tick().await;
-            self.look().await;
-        }
-    }
-
-    async fn look(&self) {
-        let text = match read(self.path.clone()).await {
-            Ok(text) => text,
-            Err(fault) => {
-                // Said once.
-                if self.lock().seen.take().is_some() {
-                    error!(%fault, "the keys stay as they are");
-                }
-                return;
-            }
-        };
-        if self.lock().seen.as_ref() == Some(&text) {
-            return;
-        }
-        let keys = keys_of(&self.path, &text, &self.keys());
-        let mut state = self.lock();
-        state.seen = Some(text);
-        match keys {
-            Ok(keys) => {
-                info!(keys = keys.len(), "keys read again");
-                state.running_limits = Arc::new(running_limits(&keys));
-                state.keys = keys;
-            }
-            Err(fault) => error!(%fault, "the keys stay as they are"),
-        }
+        self.0.watch().await;
     }
 
     /// The key of a secret. Every key is compared, so that the time tells nothing about them.
@@ -212,52 +201,12 @@ impl KeyRing {
 
     /// Most jobs that may run of each key that has such a limit, by its id.
     pub fn running_limits(&self) -> Arc<RunningLimits> {
-        Arc::clone(&self.lock().running_limits)
+        Arc::clone(&self.0.value().running_limits)
     }
 
     fn keys(&self) -> Arc<[Arc<Key>]> {
-        Arc::clone(&self.lock().keys)
+        Arc::clone(&self.0.value().all)
     }
-
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-async fn read(path: PathBuf) -> Result<Vec<u8>, KeyFileError> {
-    let unreadable = |path: &Path, source| KeyFileError::Unreadable {
-        path: path.to_owned(),
-        source,
-    };
-    let reading = task::spawn_blocking({
-        let path = path.clone();
-        move || match fs::metadata(&path)?.len() {
-            0..=MAX_FILE_BYTES => fs::read(&path),
-            bytes => Err(io::Error::other(format!(
-                "it has {bytes} bytes; the limit is {MAX_FILE_BYTES}"
-            ))),
-        }
-    });
-    let text = reading
-        .await
-        .unwrap_or_else(|error| Err(io::Error::other(error)));
-    text.map_err(|source| unreadable(&path, source))
-}
-
-/// The keys of a text. Those that were among `before` go on with what they have used.
-fn keys_of(path: &Path, text: &[u8], before: &[Arc<Key>]) -> Result<Arc<[Arc<Key>]>, KeyFileError> {
-    let file = KeyFile::parse(text).map_err(|detail| KeyFileError::Invalid {
-        path: path.to_owned(),
-        detail,
-    })?;
-    let KeyFile { defaults, keys } = file;
-    let before: HashMap<&KeyId, &Arc<Usage>> =
-        before.iter().map(|key| (&key.id, &key.usage)).collect();
-    let keys = keys.0.into_iter().map(|entry| {
-        let usage = before.get(&entry.id).copied().cloned().unwrap_or_default();
-        Arc::new(Key::of(entry, defaults, usage))
-    });
-    Ok(keys.collect())
 }
 
 fn running_limits(keys: &[Arc<Key>]) -> RunningLimits {

@@ -74,6 +74,7 @@ mod threads;
 mod tls;
 mod traces;
 mod uploads;
+mod watched_files;
 mod webhook;
 
 use std::{
@@ -274,6 +275,9 @@ pub async fn serve(
     }
     if let Some(certificate) = app.certificate.clone() {
         watching.spawn(certificate.watch());
+    }
+    if let Some(webhooks) = app.webhooks.clone() {
+        watching.spawn(async move { webhooks.watch().await });
     }
     let drained = tokio::spawn({
         let (app, stop) = (Arc::clone(&app), stop.clone());

@@ -63,9 +63,9 @@ pub fn document() -> Value {
             "/readyz": { "get": probe("Whether the service mends: warmed up and not shutting down", &[503]) },
             "/metrics": { "get": probe("Metrics in Prometheus text format", &[]) },
             "/info": { "get": {
-                "summary": "The version, and the limits of a request",
+                "summary": "The version and the build, the weights, and the limits of a request",
                 "operationId": "info",
-                "responses": { "200": { "description": "Version and limits", "content": { JSON: { "schema": reference("Info") } } } },
+                "responses": { "200": { "description": "Version, build, weights and limits", "content": { JSON: { "schema": reference("Info") } } } },
             } },
             "/openapi.json": { "get": {
                 "summary": "This document",
@@ -341,6 +341,22 @@ fn info_schema() -> Value {
         "description": "The version, and the limits that a client can check before it sends a scan",
         "properties": {
             "version": { "type": "string", "description": "darn's version" },
+            "build": {
+                "type": "object",
+                "description": "What the program was built of and for",
+                "properties": {
+                    "commit": { "type": "string", "description": "The commit, where the build was told it" },
+                    "architecture": { "type": "string", "description": "The processor's, such as x86_64" },
+                    "system": { "type": "string", "description": "The operating system, such as linux" },
+                },
+                "required": ["architecture", "system"],
+            },
+            "weights": {
+                "type": "array",
+                "description": "The weights that are loaded, those of requests that name none first",
+                "items": reference("Weights"),
+            },
+            "instance": { "type": "string", "description": "This process among those that serve together: the ids of its sessions begin with it" },
             "jobs": { "type": "boolean", "description": "Whether the service keeps jobs: whether it was started with `--data`" },
             "limits": {
                 "type": "object",
@@ -373,6 +389,6 @@ fn info_schema() -> Value {
                 "required": ["id", "scopes", "limits"],
             },
         },
-        "required": ["version", "jobs", "limits"],
+        "required": ["version", "build", "weights", "instance", "jobs", "limits"],
     })
 }

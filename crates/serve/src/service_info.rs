@@ -1,8 +1,9 @@
-//! `GET /info`: the version, and the limits that a client can check before it sends a scan.
+//! `GET /info`: the version and the build, the weights, and the limits that a client can check before it sends a scan.
 
 use std::sync::Arc;
 
 use axum::{extract::State, response::Response};
+use darn_contract::v1;
 use serde::Serialize;
 
 use super::{
@@ -17,6 +18,9 @@ use super::{
 struct Info {
     /// darn's version.
     version: &'static str,
+    build: InfoBuild,
+    /// The weights that are loaded, those of requests that name none first.
+    weights: Vec<v1::Weights>,
     /// This process among those that serve together: the ids of its sessions begin with it.
     instance: String,
     /// Whether the service keeps jobs.
@@ -25,6 +29,19 @@ struct Info {
     /// The caller's key, where the service takes keys.
     #[serde(skip_serializing_if = "Option::is_none")]
     key: Option<InfoKey>,
+}
+
+/// The commit that the program was built of, where the build was told it (`DARN_COMMIT`).
+const COMMIT: Option<&str> = option_env!("DARN_COMMIT");
+
+#[derive(Debug, Serialize)]
+struct InfoBuild {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    commit: Option<&'static str>,
+    /// The processor's, such as `x86_64`.
+    architecture: &'static str,
+    /// The operating system, such as `linux`.
+    system: &'static str,
 }
 
 #[derive(Debug, Serialize)]
@@ -56,6 +73,12 @@ struct InfoLimits {
 pub async fn answer(State(app): State<Arc<App>>, caller: Caller) -> Response {
     response::json_response(response::json(&Info {
         version: env!("CARGO_PKG_VERSION"),
+        build: InfoBuild {
+            commit: COMMIT.filter(|commit| !commit.is_empty()),
+            architecture: std::env::consts::ARCH,
+            system: std::env::consts::OS,
+        },
+        weights: app.weights(),
         instance: app.instance.name().to_string(),
         jobs: app.jobs.is_some(),
         limits: InfoLimits {

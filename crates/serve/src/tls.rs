@@ -1,10 +1,9 @@
 //! The certificate with which the service proves who it is, read again when its files change, and the TLS handshake of a connection.
 
 use std::{
-    fs,
-    io::{self, Read as _},
+    io,
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, PoisonError},
+    sync::Arc,
     time::Duration,
 };
 
@@ -16,18 +15,14 @@ use rustls::{
         pem::{self, PemObject},
     },
 };
-use sha2::{Digest as _, Sha256};
 use tokio::{
     io::{AsyncRead, AsyncWrite},
-    task, time,
+    time,
 };
 use tokio_rustls::{TlsAcceptor, server::TlsStream};
-use tracing::{error, info};
 
-/// How often the files are looked at.
-const LOOK_EVERY: Duration = Duration::from_secs(1);
-/// Most bytes of each file; chains and keys have a few thousand.
-const MAX_FILE_BYTES: u64 = 1 << 20;
+use super::watched_files::{Watched, WatchedSource, read_file};
+
 /// The protocols offered, the preferred one first (RFC 7301).
 const PROTOCOLS: [&[u8]; 2] = [b"h2", b"http/1.1"];
 
@@ -93,76 +88,61 @@ pub struct TlsFiles {
 /// The certificate of the service.
 #[derive(Debug)]
 pub struct ServedCertificate {
-    files: TlsFiles,
+    config: Watched<TlsFiles>,
     /// Longest time of a handshake.
     handshake: Duration,
-    state: Mutex<State>,
 }
 
-#[derive(Debug)]
-struct State {
-    config: Arc<ServerConfig>,
-    /// The digest of the files as they were seen last, valid or not; `None` when one could not be read.
-    seen: Option<[u8; 32]>,
-}
+impl WatchedSource for TlsFiles {
+    type Value = ServerConfig;
+    type Error = TlsError;
+    const READ_AGAIN: &'static str = "certificate read again";
+    const STAYS: &'static str = "the certificate stays as it is";
 
-/// What the two files say.
-struct Texts {
-    certificate: Vec<u8>,
-    key: Vec<u8>,
+    fn texts(&self) -> Result<Vec<Vec<u8>>, TlsError> {
+        Ok(vec![
+            read(&self.certificate, "DARN_TLS_CERT")?,
+            read(&self.key, "DARN_TLS_KEY")?,
+        ])
+    }
+
+    fn value(&self, texts: &[Vec<u8>], _: Option<&ServerConfig>) -> Result<ServerConfig, TlsError> {
+        let text = |k: usize| texts.get(k).map_or(&[][..], Vec::as_slice);
+        let chain = chain_of(text(0), &self.certificate)?;
+        let key = PrivateKeyDer::from_pem_slice(text(1)).map_err(|error| TlsError::NoKey {
+            path: self.key.clone(),
+            detail: error.to_string(),
+        })?;
+        let unusable = |source| TlsError::Unusable {
+            certificate: self.certificate.clone(),
+            key: self.key.clone(),
+            source,
+        };
+        let mut config = ServerConfig::builder_with_provider(provider())
+            .with_safe_default_protocol_versions()
+            .map_err(unusable)?
+            .with_no_client_auth()
+            .with_single_cert(chain, key)
+            .map_err(unusable)?;
+        config.alpn_protocols = PROTOCOLS.map(<[u8]>::to_vec).to_vec();
+        Ok(config)
+    }
 }
 
 impl ServedCertificate {
-    /// Reads a certificate and its key. A handshake may take the time `handshake`.
+    /// Reads a certificate and its key; blocks. A handshake may take the time `handshake`.
     ///
     /// # Errors
     /// See [`TlsError`].
-    pub async fn open(files: TlsFiles, handshake: Duration) -> Result<Arc<Self>, TlsError> {
-        let texts = read(files.clone()).await?;
-        let config = texts.config(&files)?;
-        let seen = Some(texts.digest());
-        Ok(Arc::new(Self {
-            files,
-            handshake,
-            state: Mutex::new(State { config, seen }),
-        }))
+    pub fn open(files: TlsFiles, handshake: Duration) -> Result<Arc<Self>, TlsError> {
+        let config = Watched::open(files)?;
+        Ok(Arc::new(Self { config, handshake }))
     }
 
     /// Reads the files again whenever one changes; never ends. Files that cannot be used, or that do not belong together because only
     /// one is new, leave the certificate as it is, and the log says why. Open connections stay.
     pub async fn watch(self: Arc<Self>) {
-        let mut tick = time::interval(LOOK_EVERY);
-        loop {
-            tick.tick().await;
-            self.look().await;
-        }
-    }
-
-    async fn look(&self) {
-        let texts = match read(self.files.clone()).await {
-            Ok(texts) => texts,
-            Err(fault) => {
-                // Said once.
-                if self.lock().seen.take().is_some() {
-                    error!(%fault, "the certificate stays as it is");
-                }
-                return;
-            }
-        };
-        let digest = texts.digest();
-        if self.lock().seen == Some(digest) {
-            return;
-        }
-        let config = texts.config(&self.files);
-        let mut state = self.lock();
-        state.seen = Some(digest);
-        match config {
-            Ok(config) => {
-                info!("certificate read again");
-                state.config = config;
-            }
-            Err(fault) => error!(%fault, "the certificate stays as it is"),
-        }
+        self.config.watch().await;
     }
 
     /// The handshake of a connection.
@@ -173,8 +153,7 @@ impl ServedCertificate {
     where
         S: AsyncRead + AsyncWrite + Unpin,
     {
-        let config = Arc::clone(&self.lock().config);
-        let handshake = TlsAcceptor::from(config).accept(stream);
+        let handshake = TlsAcceptor::from(self.config.value()).accept(stream);
         match time::timeout(self.handshake, handshake).await {
             Ok(outcome) => outcome,
             Err(_) => Err(io::Error::new(
@@ -182,41 +161,6 @@ impl ServedCertificate {
                 "the handshake takes too long",
             )),
         }
-    }
-
-    fn lock(&self) -> std::sync::MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Texts {
-    fn config(&self, files: &TlsFiles) -> Result<Arc<ServerConfig>, TlsError> {
-        let chain = chain_of(&self.certificate, &files.certificate)?;
-        let key = PrivateKeyDer::from_pem_slice(&self.key).map_err(|error| TlsError::NoKey {
-            path: files.key.clone(),
-            detail: error.to_string(),
-        })?;
-        let unusable = |source| TlsError::Unusable {
-            certificate: files.certificate.clone(),
-            key: files.key.clone(),
-            source,
-        };
-        let mut config = ServerConfig::builder_with_provider(provider())
-            .with_safe_default_protocol_versions()
-            .map_err(unusable)?
-            .with_no_client_auth()
-            .with_single_cert(chain, key)
-            .map_err(unusable)?;
-        config.alpn_protocols = PROTOCOLS.map(<[u8]>::to_vec).to_vec();
-        Ok(Arc::new(config))
-    }
-
-    fn digest(&self) -> [u8; 32] {
-        let mut digest = Sha256::new();
-        digest.update(self.certificate.len().to_le_bytes());
-        digest.update(&self.certificate);
-        digest.update(&self.key);
-        digest.finalize().into()
     }
 }
 
@@ -230,7 +174,7 @@ pub fn provider() -> Arc<CryptoProvider> {
 /// # Errors
 /// `Unreadable` or `NoCertificate`.
 pub fn certificate_chain(path: &Path) -> Result<Vec<CertificateDer<'static>>, TlsError> {
-    chain_of(&read_file(path, "DARN_TLS_CERT")?, path)
+    chain_of(&read(path, "DARN_TLS_CERT")?, path)
 }
 
 fn chain_of(text: &[u8], path: &Path) -> Result<Vec<CertificateDer<'static>>, TlsError> {
@@ -246,35 +190,8 @@ fn chain_of(text: &[u8], path: &Path) -> Result<Vec<CertificateDer<'static>>, Tl
     }
 }
 
-async fn read(files: TlsFiles) -> Result<Texts, TlsError> {
-    let path = files.certificate.clone();
-    let reading = task::spawn_blocking(move || {
-        Ok(Texts {
-            certificate: read_file(&files.certificate, "DARN_TLS_CERT")?,
-            key: read_file(&files.key, "DARN_TLS_KEY")?,
-        })
-    });
-    reading.await.unwrap_or_else(|error| {
-        Err(TlsError::Unreadable {
-            path,
-            setting: "DARN_TLS_CERT",
-            source: io::Error::other(error),
-        })
-    })
-}
-
-fn read_file(path: &Path, setting: &'static str) -> Result<Vec<u8>, TlsError> {
-    let read = || {
-        let mut text = Vec::new();
-        let mut file = fs::File::open(path)?.take(MAX_FILE_BYTES + 1);
-        match file.read_to_end(&mut text)? as u64 {
-            0..=MAX_FILE_BYTES => Ok(text),
-            _ => Err(io::Error::other(format!(
-                "it has more than {MAX_FILE_BYTES} bytes"
-            ))),
-        }
-    };
-    read().map_err(|source| TlsError::Unreadable {
+fn read(path: &Path, setting: &'static str) -> Result<Vec<u8>, TlsError> {
+    read_file(path).map_err(|source| TlsError::Unreadable {
         path: path.to_owned(),
         setting,
         source,

@@ -18,12 +18,13 @@ use super::{
     error::RequestError,
     key_file::KeyId,
     keys::{Key, KeyRing},
+    watched_files::Watched,
 };
 use destination::{UrlRules, WebhookUrl};
 use post::Poster;
 pub use secret::WebhookSecrets;
+use settings::{SecretsFile, roots, service_secrets};
 pub use settings::{WebhookArgs, WebhookSettingsError};
-use settings::{roots, service_secrets};
 
 /// What the webhooks of a service need.
 #[derive(Debug)]
@@ -31,8 +32,8 @@ pub struct Webhooks {
     /// Where they may go.
     rules: UrlRules,
     poster: Poster,
-    /// What signs those of clients without secrets of their own; empty: they may have none.
-    secrets: WebhookSecrets,
+    /// What signs those of clients without secrets of their own; `None`: they may have none.
+    secrets: Option<Watched<SecretsFile>>,
 }
 
 /// Why no webhook can be signed.
@@ -61,6 +62,21 @@ impl Webhooks {
         })
     }
 
+    /// Reads the file of secrets again whenever it changes; never ends with such a file.
+    pub async fn watch(&self) {
+        if let Some(secrets) = &self.secrets {
+            secrets.watch().await;
+        }
+    }
+
+    /// The secrets of the service; empty without a file of them.
+    fn service_secrets(&self) -> WebhookSecrets {
+        let secrets = self.secrets.as_ref();
+        secrets.map_or_else(WebhookSecrets::default, |secrets| {
+            WebhookSecrets::clone(&secrets.value())
+        })
+    }
+
     /// A URL that a caller names for a job, in the form in which it is kept.
     ///
     /// # Errors
@@ -69,7 +85,7 @@ impl Webhooks {
         let url = WebhookUrl::parse(text, &self.rules)
             .map_err(|detail| RequestError::Malformed(format!("`webhook` {detail}")))?;
         let own = key.is_some_and(|key| !key.webhook_secrets.is_empty());
-        if !own && self.secrets.is_empty() {
+        if !own && self.service_secrets().is_empty() {
             return Err(RequestError::WebhooksOff);
         }
         Ok(url.text().to_owned())
@@ -90,7 +106,7 @@ impl Webhooks {
             _ => WebhookSecrets::default(),
         };
         let secrets = if own.is_empty() {
-            self.secrets.clone()
+            self.service_secrets()
         } else {
             own
         };

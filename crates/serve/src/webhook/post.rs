@@ -4,12 +4,12 @@ use std::{
     io,
     net::{IpAddr, SocketAddr},
     sync::Arc,
-    time::Duration,
+    time::{Duration, SystemTime},
 };
 
 use axum::{
     body::{Body, to_bytes},
-    http::{Method, Request, StatusCode, header},
+    http::{HeaderMap, Method, Request, StatusCode, header},
 };
 use bytes::Bytes;
 use hyper::client::conn::http1;
@@ -83,6 +83,15 @@ pub enum PostError {
     Request(#[from] axum::http::Error),
 }
 
+/// What a receiver answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PostAnswer {
+    /// Its status.
+    pub status: StatusCode,
+    /// How long it asks not to be asked again.
+    pub again_after: Option<Duration>,
+}
+
 /// What sends.
 #[derive(Debug)]
 pub struct Poster {
@@ -117,16 +126,16 @@ impl Poster {
         self.time
     }
 
-    /// Sends a message; answers with the status of the answer.
+    /// Sends a message.
     ///
     /// # Errors
     /// See [`PostError`].
-    pub async fn post(&self, url: &WebhookUrl, message: &Message) -> Result<StatusCode, PostError> {
+    pub async fn post(&self, url: &WebhookUrl, message: &Message) -> Result<PostAnswer, PostError> {
         let sent = timeout(self.time, self.send(url, message)).await;
         sent.unwrap_or(Err(PostError::Timeout(self.time)))
     }
 
-    async fn send(&self, url: &WebhookUrl, message: &Message) -> Result<StatusCode, PostError> {
+    async fn send(&self, url: &WebhookUrl, message: &Message) -> Result<PostAnswer, PostError> {
         let request = Request::builder()
             .method(Method::POST)
             .uri(url.path())
@@ -197,7 +206,7 @@ impl Poster {
 async fn ask(
     stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static,
     request: Request<Body>,
-) -> Result<StatusCode, PostError> {
+) -> Result<PostAnswer, PostError> {
     let (mut sender, connection) = http1::Builder::new()
         .max_buf_size(MAX_HEAD_BYTES)
         .handshake(TokioIo::new(stream))
@@ -208,10 +217,48 @@ async fn ask(
         .send_request(request)
         .await
         .map_err(PostError::Answer)?;
-    let status = answer.status();
+    let said = PostAnswer {
+        status: answer.status(),
+        again_after: again_after(answer.headers(), SystemTime::now()),
+    };
     // What it says more, and whether that ends, changes nothing.
     to_bytes(Body::new(answer.into_body()), MAX_BODY_BYTES)
         .await
         .ok();
-    Ok(status)
+    Ok(said)
+}
+
+/// How long the receiver asks not to be asked again (RFC 9110, 10.2.3): seconds, or a date.
+fn again_after(headers: &HeaderMap, now: SystemTime) -> Option<Duration> {
+    let said = headers.get(header::RETRY_AFTER)?.to_str().ok()?.trim();
+    match said.parse::<u64>() {
+        Ok(seconds) => Some(Duration::from_secs(seconds)),
+        Err(_) => httpdate::parse_http_date(said)
+            .ok()?
+            .duration_since(now)
+            .ok(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use axum::http::HeaderValue;
+
+    use super::*;
+
+    #[test]
+    fn a_receiver_asks_for_seconds_or_a_date() {
+        let now = httpdate::parse_http_date("Sun, 29 Nov 2026 12:00:00 GMT").unwrap();
+        let asked = |said: &'static str| {
+            let header = (header::RETRY_AFTER, HeaderValue::from_static(said));
+            again_after(&HeaderMap::from_iter([header]), now)
+        };
+        assert_eq!(asked("120"), Some(Duration::from_secs(120)));
+        let hour = "Sun, 29 Nov 2026 13:00:00 GMT";
+        assert_eq!(asked(hour), Some(Duration::from_secs(3600)));
+        for nothing in ["Sun, 29 Nov 2026 11:00:00 GMT", "-1", "soon", ""] {
+            assert_eq!(asked(nothing), None, "{nothing}");
+        }
+        assert_eq!(again_after(&HeaderMap::new(), now), None);
+    }
 }

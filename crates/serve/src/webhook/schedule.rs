@@ -28,6 +28,12 @@ pub fn pause_after(tries: i64, random: f64) -> Option<Duration> {
     Some(pause.mul_f64(1.0 + JITTER * (2.0 * random.clamp(0.0, 1.0) - 1.0)))
 }
 
+/// A pause, or a longer one that the receiver asks for; the longest of the schedule at most.
+pub fn pause_as_asked(pause: Duration, asked: Option<Duration>) -> Duration {
+    let most = PAUSES.iter().copied().max().unwrap_or(pause);
+    pause.max(asked.unwrap_or_default().min(most))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -44,5 +50,14 @@ mod tests {
         assert_eq!(all, minutes(75 * 60 + 35) + Duration::from_secs(5));
         assert_eq!(pause_after(10, 0.5), None);
         assert_eq!(pause_after(i64::MAX, 0.5), None);
+    }
+
+    #[test]
+    fn a_receiver_may_ask_for_a_longer_pause_up_to_a_day() {
+        let asked = |seconds| pause_as_asked(minutes(5), Some(Duration::from_secs(seconds)));
+        assert_eq!(pause_as_asked(minutes(5), None), minutes(5));
+        assert_eq!(asked(10), minutes(5));
+        assert_eq!(asked(7200), minutes(120));
+        assert_eq!(asked(u64::MAX), minutes(24 * 60));
     }
 }

@@ -20,8 +20,8 @@ use super::{
     Webhooks,
     destination::WebhookUrl,
     event,
-    post::{Message, PostError},
-    schedule::pause_after,
+    post::{Message, PostAnswer, PostError},
+    schedule::{pause_after, pause_as_asked},
 };
 use crate::app::App;
 use darn_contract::cut;
@@ -52,7 +52,7 @@ pub struct WebhookSender {
 
 /// How a try failed, or that it did not.
 enum Tried {
-    Answered(StatusCode),
+    Answered(PostAnswer),
     Failed(String),
     Interrupted,
 }
@@ -184,7 +184,7 @@ impl WebhookSender {
             body: body.into(),
         };
         match poster.post(&url, &message).await {
-            Ok(status) => Tried::Answered(status),
+            Ok(answer) => Tried::Answered(answer),
             Err(error) => {
                 if let PostError::NotPublic { address, kind } = &error {
                     warn!(job = %delivery.job, host = url.host(), %address, kind, "a webhook would go where none may");
@@ -223,10 +223,13 @@ impl WebhookSender {
 fn outcome(tried: Tried, tries: i64) -> TryOutcome {
     // The last 32 bits of an id are random.
     let random = f64::from(Uuid::new_v4().as_u128() as u32) / f64::from(u32::MAX);
-    let (status, error) = match tried {
+    let (status, error, asked) = match tried {
         Tried::Interrupted => return TryOutcome::GivenBack,
-        Tried::Failed(error) => (None, error),
-        Tried::Answered(status) => {
+        Tried::Failed(error) => (None, error, None),
+        Tried::Answered(PostAnswer {
+            status,
+            again_after,
+        }) => {
             let number = i64::from(status.as_u16());
             if status.is_success() {
                 return TryOutcome::Delivered { status: number };
@@ -238,13 +241,13 @@ fn outcome(tried: Tried, tries: i64) -> TryOutcome {
                 true => format!("the receiver answered with {number}; redirects are not followed"),
                 false => format!("the receiver answered with {number}"),
             };
-            (Some(number), error)
+            (Some(number), error, again_after)
         }
     };
     TryOutcome::Failed {
         status,
         error: cut(&error, ERROR_BYTES).into_owned(),
-        again_after: pause_after(tries, random),
+        again_after: pause_after(tries, random).map(|pause| pause_as_asked(pause, asked)),
     }
 }
 
@@ -256,7 +259,11 @@ mod tests {
     fn only_2xx_is_a_delivery_and_410_ends_them() {
         let of = |status: u16, tries| {
             let status = StatusCode::from_u16(status).unwrap();
-            outcome(Tried::Answered(status), tries)
+            let answer = PostAnswer {
+                status,
+                again_after: None,
+            };
+            outcome(Tried::Answered(answer), tries)
         };
         for status in [200, 201, 204, 299] {
             let status_kept = i64::from(status);

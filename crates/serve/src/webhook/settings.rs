@@ -1,7 +1,7 @@
 //! The settings of webhooks.
 
 use std::{
-    fs, io,
+    io,
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -16,14 +16,12 @@ use tracing::warn;
 
 use super::WebhookSecrets;
 use crate::config::duration;
-
-/// Most bytes of a file of secrets.
-const MAX_SECRETS_BYTES: u64 = 64 << 10;
+use crate::watched_files::{Watched, WatchedSource, read_file};
 
 /// Webhooks of jobs
 #[derive(Debug, Clone, Args)]
 pub struct WebhookArgs {
-    /// File with the secret that signs webhooks: `whsec_` and the base64 of 24 to 64 bytes. Of several, one a line, each signs. Left out, only
+    /// File with the secret that signs webhooks: `whsec_` and the base64 of 24 to 64 bytes. Of several, one a line, each signs; read again when it changes. Left out, only
     /// jobs of keys with `webhookSecrets` may name a webhook
     #[arg(long, env = "DARN_WEBHOOK_SECRET", value_name = "FILE")]
     pub webhook_secret: Option<PathBuf>,
@@ -84,43 +82,66 @@ pub enum WebhookSettingsError {
     Tls(#[from] rustls::Error),
 }
 
-/// The secrets of the service; none without a file.
+/// The setting of the file of secrets.
+const SECRETS: &str = "DARN_WEBHOOK_SECRET";
+
+/// The file of the service's secrets, one a line; empty lines and those that begin with # say nothing.
+#[derive(Debug)]
+pub struct SecretsFile(PathBuf);
+
+impl WatchedSource for SecretsFile {
+    type Value = WebhookSecrets;
+    type Error = WebhookSettingsError;
+    const READ_AGAIN: &'static str = "secrets of webhooks read again";
+    const STAYS: &'static str = "the secrets of webhooks stay as they are";
+
+    fn texts(&self) -> Result<Vec<Vec<u8>>, WebhookSettingsError> {
+        Ok(vec![read(&self.0, SECRETS)?])
+    }
+
+    fn value(
+        &self,
+        texts: &[Vec<u8>],
+        _: Option<&WebhookSecrets>,
+    ) -> Result<WebhookSecrets, WebhookSettingsError> {
+        let text = texts.concat();
+        let text = String::from_utf8_lossy(&text);
+        let lines = text.lines().map(str::trim);
+        let lines = lines.filter(|line| !line.is_empty() && !line.starts_with('#'));
+        let secrets = match WebhookSecrets::parse(lines) {
+            Ok(secrets) if secrets.is_empty() => Err("it has no secret".to_owned()),
+            secrets => secrets,
+        };
+        secrets.map_err(|detail| WebhookSettingsError::Invalid {
+            path: self.0.clone(),
+            setting: SECRETS,
+            detail,
+        })
+    }
+}
+
+/// The secrets of the service; `None` without a file.
 ///
 /// # Errors
 /// The file cannot be read, or has no secrets.
-pub fn service_secrets(settings: &WebhookArgs) -> Result<WebhookSecrets, WebhookSettingsError> {
-    const SETTING: &str = "DARN_WEBHOOK_SECRET";
+pub fn service_secrets(
+    settings: &WebhookArgs,
+) -> Result<Option<Watched<SecretsFile>>, WebhookSettingsError> {
     let Some(path) = &settings.webhook_secret else {
-        return Ok(WebhookSecrets::default());
+        return Ok(None);
     };
     if path.to_str().is_some_and(|text| text.starts_with("whsec_")) {
         return Err(WebhookSettingsError::SecretItself);
     }
-    let text = read_secrets(path).map_err(|source| WebhookSettingsError::Unreadable {
-        path: path.clone(),
-        setting: SETTING,
-        source,
-    })?;
-    let lines = text.lines().map(str::trim);
-    let lines = lines.filter(|line| !line.is_empty() && !line.starts_with('#'));
-    let secrets = match WebhookSecrets::parse(lines) {
-        Ok(secrets) if secrets.is_empty() => Err("it has no secret".to_owned()),
-        secrets => secrets,
-    };
-    secrets.map_err(|detail| WebhookSettingsError::Invalid {
-        path: path.clone(),
-        setting: SETTING,
-        detail,
-    })
+    Watched::open(SecretsFile(path.clone())).map(Some)
 }
 
-fn read_secrets(path: &Path) -> io::Result<String> {
-    match fs::metadata(path)?.len() {
-        0..=MAX_SECRETS_BYTES => fs::read_to_string(path),
-        bytes => Err(io::Error::other(format!(
-            "it has {bytes} bytes; the limit is {MAX_SECRETS_BYTES}"
-        ))),
-    }
+fn read(path: &Path, setting: &'static str) -> Result<Vec<u8>, WebhookSettingsError> {
+    read_file(path).map_err(|source| WebhookSettingsError::Unreadable {
+        path: path.to_owned(),
+        setting,
+        source,
+    })
 }
 
 /// The certificates of the authorities that are trusted: the system's, and those of the settings' file.
@@ -143,11 +164,7 @@ pub fn roots(settings: &WebhookArgs) -> Result<RootCertStore, WebhookSettingsErr
         setting: SETTING,
         detail,
     };
-    let text = fs::read(path).map_err(|source| WebhookSettingsError::Unreadable {
-        path: path.clone(),
-        setting: SETTING,
-        source,
-    })?;
+    let text = read(path, SETTING)?;
     let mut count = 0;
     for certificate in CertificateDer::pem_slice_iter(&text) {
         let certificate = certificate.map_err(|error| invalid(error.to_string()))?;
@@ -176,6 +193,8 @@ fn timeout(text: &str) -> Result<Duration, String> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use clap::Parser;
 
     use super::*;
@@ -221,13 +240,14 @@ mod tests {
         let secrets = |path: &str| service_secrets(&settings(&["--webhook-secret", path]).unwrap());
         let good = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw";
         let read = secrets(&file(&format!("# ours\n\n{good} \n"))).unwrap();
-        assert_eq!(read, WebhookSecrets::parse([good]).unwrap());
+        let read = read.map(|secrets| WebhookSecrets::clone(&secrets.value()));
+        assert_eq!(read, Some(WebhookSecrets::parse([good]).unwrap()));
         for path in [
             &file("# nothing"),
             &file("password"),
             good,
             "/no/such/file",
-            &file(&" ".repeat(70_000)),
+            &file(&" ".repeat(2 << 20)),
         ] {
             let refused = secrets(path).unwrap_err().to_string();
             assert!(refused.contains("DARN_WEBHOOK_SECRET"), "{refused}");
@@ -235,7 +255,8 @@ mod tests {
         }
         let authorities = |path: &str| roots(&settings(&["--webhook-ca", path]).unwrap());
         let broken = "-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n";
-        for path in [&file("nothing"), &file(broken), "/no/such/file"] {
+        let long = file(&" ".repeat(2 << 20));
+        for path in [&file("nothing"), &file(broken), &long, "/no/such/file"] {
             let refused = authorities(path).unwrap_err().to_string();
             assert!(refused.contains("DARN_WEBHOOK_CA"), "{refused}");
         }
