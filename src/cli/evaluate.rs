@@ -18,7 +18,7 @@ use darn_lab::evaluate::{
 use darn_lab::garments;
 use darn_lab::scarffolds::samples::{SampleRotation, Sampler};
 use darn_lab::scarffolds::sheets::{self, SimulatedSheet};
-use darn_net::{Averaging, FillRequest};
+use darn_net::{Averaging, FillRequest, FilledGrid, Network};
 use darn_texture::testset::Family;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -67,6 +67,9 @@ pub struct EvaluateArgs {
     /// Compare the holes of training samples with those of flattened scans instead
     #[arg(long, conflicts_with_all = ["noise", "picture", "upright", "scans"])]
     masks: bool,
+    /// Measure the plausible fills beside the likeliest one, too
+    #[arg(long)]
+    alternatives: bool,
     /// Ask the network once a grid, not for its four flips
     #[arg(long)]
     once: bool,
@@ -98,20 +101,11 @@ pub fn run(args: &EvaluateArgs) -> Result<(), Failure> {
     }
     let mender = mender(&args.network)?;
     let network = mender.networks.default();
-    let fill = |grids: &[NormalGrid]| {
-        let averaging = match args.once {
-            true => Averaging::Once,
-            false => Averaging::Flips,
-        };
-        let request = FillRequest {
-            grids,
-            up: None,
-            averaging,
-        };
-        network
-            .fill(&request)
-            .map_err(|error| EvaluateError::Filler(Box::new(error)))
+    let averaging = match args.once {
+        true => Averaging::Once,
+        false => Averaging::Flips,
     };
+    let fill = |grids: &[NormalGrid]| filled(network, grids, averaging);
     let plan = EvaluationPlan {
         noises: args.noises(),
         seed: args.seed,
@@ -123,6 +117,23 @@ pub fn run(args: &EvaluateArgs) -> Result<(), Failure> {
     drop(progress);
     let report = report.or_fail("evaluate")?;
     print!("{}", report.markdown());
+    if let (Some(errors), false) = (&network.card().errors, args.once) {
+        for noise in args.noises() {
+            let cells = evaluate::cell_errors(&cases, noise, args.seed, &fill);
+            let cells = cells.or_fail("evaluate")?;
+            println!("\nConfidence after patch, noise {noise}\n");
+            print!("{}", evaluate::coverage_table(&cells, errors));
+        }
+    }
+    if args.alternatives {
+        let fills = |grid: &NormalGrid| {
+            let fills = network.alternatives(grid, None);
+            fills.map_err(|error| EvaluateError::Filler(Box::new(error)))
+        };
+        let found = evaluate::alternative_fills(&cases, &fills).or_fail("evaluate")?;
+        println!("\nAlternatives\n");
+        print!("{}", evaluate::alternatives_table(&found));
+    }
     let scanner = SyntheticScanOptions {
         seed: args.seed,
         noise: args.scan_noise,
@@ -149,6 +160,21 @@ pub fn run(args: &EvaluateArgs) -> Result<(), Failure> {
         Some(path) => files::write(path, evaluate::picture(&report).as_bytes()),
         None => Ok(()),
     }
+}
+
+/// A network's answers.
+pub fn filled(
+    network: &Network,
+    grids: &[NormalGrid],
+    averaging: Averaging,
+) -> Result<Vec<FilledGrid>, EvaluateError> {
+    let request = FillRequest {
+        grids,
+        up: None,
+        averaging,
+    };
+    let answers = network.fill(&request);
+    answers.map_err(|error| EvaluateError::Filler(Box::new(error)))
 }
 
 impl EvaluateArgs {

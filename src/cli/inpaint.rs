@@ -8,7 +8,7 @@ use super::progress::WorkProgress;
 use super::provenance;
 use crate::settings::{DeadlineArgs, NetworkArgs, SizeArgs, TextureArgs};
 use darn_contract::v1::{HoleReport, Report};
-use darn_contract::{Constraints, FieldError, Outcome};
+use darn_contract::{Constraints, FieldError, LAST_ALTERNATIVE, Outcome};
 use darn_mend::{Call, MendError, NetworkMender};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -35,6 +35,10 @@ pub struct InpaintArgs {
     /// What the new cloth is to keep to, as JSON
     #[arg(short, long)]
     constraints: Option<PathBuf>,
+    /// Write so many plausible fills, a file each: the likeliest to the output's name, the others with -1, -2 and so on after it; the reports likewise
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=ALTERNATIVES),
+        conflicts_with_all = ["batch", "provenance", "json_lines"])]
+    alternatives: u8,
     /// Where the report goes, as JSON
     #[arg(long)]
     report: Option<PathBuf>,
@@ -53,6 +57,9 @@ pub struct InpaintArgs {
     #[command(flatten)]
     network: NetworkArgs,
 }
+
+/// Most plausible fills of a hole.
+const ALTERNATIVES: i64 = LAST_ALTERNATIVE as i64 + 1;
 
 /// What becomes of a scan without holes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -76,8 +83,22 @@ pub fn run(args: &InpaintArgs) -> Result<(), Failure> {
         None => println!("{}", stage_line(what, started)),
     };
     stage("loading weights");
-    let mended = FileMender::new(args)
-        .and_then(|mender| mender.mend(scan, &args.output, args.report.as_deref(), &stage));
+    let mended = FileMender::new(args).and_then(|mut mender| {
+        for number in 1..args.alternatives {
+            mender.constraints.alternative = Some(number);
+            let report = args.report.as_ref().map(|path| numbered(path, number));
+            mender.mend(
+                scan,
+                &numbered(&args.output, number),
+                report.as_deref(),
+                &stage,
+            )?;
+        }
+        if args.alternatives > 1 {
+            mender.constraints.alternative = Some(0);
+        }
+        mender.mend(scan, &args.output, args.report.as_deref(), &stage)
+    });
     drop(progress);
     if args.json_lines {
         let outcome = mended.unwrap_or_else(FileOutcome::Failed);
@@ -90,6 +111,17 @@ pub fn run(args: &InpaintArgs) -> Result<(), Failure> {
         _ => println!("the scan has no holes and was copied"),
     }
     Ok(())
+}
+
+/// A path with a number after the name of the file: `mended-2.glb`.
+fn numbered(path: &Path, number: u8) -> PathBuf {
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push(format!("-{number}"));
+    if let Some(extension) = path.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    path.with_file_name(name)
 }
 
 /// What mends scans in files, with the settings of a command.
@@ -381,6 +413,13 @@ mod tests {
             text.starts_with("hole 1: ") && text.contains("left loop 0"),
             "{text}"
         );
+    }
+
+    #[test]
+    fn the_number_of_an_alternative_follows_the_name() {
+        let numbered = |path: &str| numbered(Path::new(path), 2);
+        assert_eq!(numbered("out/mended.glb"), Path::new("out/mended-2.glb"));
+        assert_eq!(numbered("mended"), Path::new("mended-2"));
     }
 
     #[test]

@@ -6,6 +6,9 @@
 mod batch;
 mod bench;
 #[cfg(feature = "burn")]
+mod calibrate;
+mod confidence_paint;
+#[cfg(feature = "burn")]
 mod evaluate;
 mod failure;
 mod files;
@@ -84,6 +87,9 @@ enum CliCommand {
     /// Measure a network's fills on held-out sheets
     #[cfg(feature = "burn")]
     Evaluate(evaluate::EvaluateArgs),
+    /// Measure how far a network's answers are off on held-out sheets, and write it into its weights file
+    #[cfg(feature = "burn")]
+    Calibrate(calibrate::CalibrateArgs),
     /// Measure how long the network and a mend take here
     Bench(bench::BenchArgs),
     /// Make keys for a service
@@ -138,6 +144,8 @@ fn run(command: CliCommand) -> Result<(), Failure> {
         CliCommand::Train(args) => train::run(&args),
         #[cfg(feature = "burn")]
         CliCommand::Evaluate(args) => evaluate::run(&args),
+        #[cfg(feature = "burn")]
+        CliCommand::Calibrate(args) => calibrate::run(&args),
         CliCommand::Bench(args) => bench::run(&args),
         CliCommand::Key(args) => key::run(&args),
         CliCommand::Openapi => openapi::run(),

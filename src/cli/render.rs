@@ -1,5 +1,6 @@
-//! `darn render`: a picture of a scan; reconstructed cloth has another colour, or all has the scan's own.
+//! `darn render`: a picture of a scan; reconstructed cloth has another colour, or that of its confidence, or all has the scan's own.
 
+use super::confidence_paint::ConfidencePaint;
 use super::failure::{Failure, OrFail};
 use super::files;
 use super::scan_paint::ScanPaint;
@@ -42,6 +43,9 @@ pub struct RenderArgs {
     /// Draw the scan's own colours in this material variant, such as "Reconstruction marked"
     #[arg(long, value_name = "NAME")]
     variant: Option<String>,
+    /// Draw reconstructed cloth by how far it may be off: from yellow, certain, to dark violet
+    #[arg(long, conflicts_with_all = ["colours", "variant"])]
+    confidence: bool,
     #[command(flatten)]
     limits: SizeArgs,
 }
@@ -50,9 +54,10 @@ pub struct RenderArgs {
 pub fn run(args: &RenderArgs) -> Result<(), Failure> {
     let scan = files::read_scan(&args.scan, &args.limits, Budget::unlimited())?;
     let welded = weld::weld(&scan.surface);
-    let image = match args.colours || args.variant.is_some() {
-        true => coloured(&scan, &welded, args)?,
-        false => {
+    let image = match (args.colours || args.variant.is_some(), args.confidence) {
+        (true, _) => coloured(&scan, &welded, args)?,
+        (false, true) => confident(&scan, &welded, args)?,
+        (false, false) => {
             let faces = welded.soup_face.iter();
             let tints: Vec<[u8; 3]> = faces.map(|&face| tint(&scan, face)).collect();
             picture(&welded.mesh, &tints, &args.options())
@@ -80,6 +85,28 @@ fn coloured(scan: &Scan, welded: &WeldedMesh, args: &RenderArgs) -> Result<RgbIm
         let part = (welded.soup_face.get(place.face)).and_then(|face| scan.part_of_face(*face));
         let corners = welded.soup_corners(&scan.surface, face);
         match part.zip(corners) {
+            Some((part, corners)) => paint.at(part, corners, place.weights),
+            None => [1.0; 3],
+        }
+    };
+    Ok(painted(&welded.mesh, &at, &args.options()))
+}
+
+/// The picture of the confidence in reconstructed cloth; says what the darkest colour means.
+fn confident(scan: &Scan, welded: &WeldedMesh, args: &RenderArgs) -> Result<RgbImage, Failure> {
+    let paint = ConfidencePaint::new(scan).ok_or_else(|| {
+        let reason = "no reconstructed cloth of the scan says how far it may be off (_CONFIDENCE)";
+        Failure::Usage(reason.into())
+    })?;
+    println!(
+        "{}: from yellow, as scanned, to dark violet, a standard deviation of {} (in the scene's unit)",
+        args.output.display(),
+        paint.most
+    );
+    let at = |place: &FacePlace| {
+        let face = FaceId(place.face as u32);
+        let part = (welded.soup_face.get(place.face)).and_then(|face| scan.part_of_face(*face));
+        match part.zip(welded.soup_corners(&scan.surface, face)) {
             Some((part, corners)) => paint.at(part, corners, place.weights),
             None => [1.0; 3],
         }

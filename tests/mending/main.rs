@@ -1,10 +1,12 @@
 //! From glTF to glTF with the shipped weights, on cloth that darn's own generator simulated.
 
+mod alternatives;
 mod bodies;
 mod borders;
 mod cloth;
 mod colours;
 mod compressed;
+mod confidence;
 mod cuts;
 mod editing;
 #[path = "../../crates/gltf-scan/src/compressed/encoded.rs"]

@@ -6,8 +6,10 @@ use darn_json::{EXCERPT_BYTES, excerpt};
 
 use super::v1;
 
+mod choices;
 mod selector;
 
+pub use choices::{Fill, LAST_ALTERNATIVE, TextureChoice};
 pub(super) use selector::list;
 pub use selector::{Border, Cut, HoleSelector};
 
@@ -59,30 +61,8 @@ pub struct Constraints {
     pub accept_doubtful: bool,
     /// Where the patches' colours come from; `None` leaves it to the mender.
     pub texture: Option<TextureChoice>,
-}
-
-/// Where the colour of a patch comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TextureChoice {
-    /// Images of its own, completed from the cloth around it.
-    Synthesize,
-    /// The scan's texture coordinates and colours, continued from the rim.
-    Continue,
-    /// One colour: the mean of the cloth around it.
-    Flat,
-    /// Grey.
-    None,
-}
-
-/// Kinds of loops to fill. None of them includes outer boundaries.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Fill {
-    /// Damage.
-    Holes,
-    /// Finished openings and the ends of tubes.
-    Openings,
-    /// Both.
-    All,
+    /// Which of the plausible fills is applied, 0 (the likeliest) to [`LAST_ALTERNATIVE`]; `None` leaves it to the mender.
+    pub alternative: Option<u8>,
 }
 
 /// A range of loop diameters, both ends included, in the scene's unit. The default has no ends.
@@ -194,6 +174,7 @@ impl Constraints {
         errors.name("/weights", message.weights.as_deref());
         let fill = (message.fill.as_deref()).and_then(|fill| errors.fill(fill));
         let texture = (message.texture.as_deref()).and_then(|texture| errors.texture(texture));
+        let alternative = (message.alternative).and_then(|number| errors.alternative(number));
         let diameters = Diameters {
             max: errors.diameter("/maxDiameter", message.max_diameter),
             min: errors.diameter("/minDiameter", message.min_diameter),
@@ -218,6 +199,7 @@ impl Constraints {
                 except: message.except.clone(),
                 accept_doubtful: message.accept_doubtful,
                 texture,
+                alternative,
             })
         } else {
             Err(errors.0)
@@ -277,36 +259,6 @@ impl FieldErrors {
                 at,
                 format!("a name of {length} bytes; the limit is {EXCERPT_BYTES}"),
             );
-        }
-    }
-
-    fn fill(&mut self, fill: &str) -> Option<Fill> {
-        match fill {
-            "holes" => Some(Fill::Holes),
-            "openings" => Some(Fill::Openings),
-            "all" => Some(Fill::All),
-            other => {
-                let got = excerpt(other);
-                let detail = format!("expected `holes`, `openings` or `all`; got `{got}`");
-                self.push("/fill", detail);
-                None
-            }
-        }
-    }
-
-    fn texture(&mut self, texture: &str) -> Option<TextureChoice> {
-        match texture {
-            "synthesize" => Some(TextureChoice::Synthesize),
-            "continue" => Some(TextureChoice::Continue),
-            "flat" => Some(TextureChoice::Flat),
-            "none" => Some(TextureChoice::None),
-            other => {
-                let got = excerpt(other);
-                let detail =
-                    format!("expected `synthesize`, `continue`, `flat` or `none`; got `{got}`");
-                self.push("/texture", detail);
-                None
-            }
         }
     }
 

@@ -87,6 +87,10 @@ fn diameters_and_kinds_to_fill_are_read() {
         ..Constraints::default()
     };
     assert_eq!(check(text), Ok(expected));
+    let rare = check(r#"{"alternative": 7}"#).map(|asked| asked.alternative);
+    assert_eq!(rare, Ok(Some(7)));
+    let beyond = check(r#"{"alternative": 8}"#);
+    assert_eq!(beyond, Err(vec!["/alternative".to_owned()]));
     let crossed = check(r#"{"minDiameter": 2, "maxDiameter": 1}"#);
     assert_eq!(crossed, Err(vec!["/minDiameter".to_owned()]));
 }

@@ -82,6 +82,36 @@ pub fn neighbour_pairs() -> impl Iterator<Item = (usize, usize)> {
     right.chain(upper)
 }
 
+/// Exact distance of every cell's centre from the nearest cell of the mask, in cells, computed by columns and then by rows; at least
+/// the grid's side where the mask is empty.
+pub fn distances_to(mask: &[bool]) -> Vec<f32> {
+    const FAR: f32 = 4.0 * SIDE as f32;
+    let mut column = vec![FAR; CELLS];
+    for i in 0..SIDE {
+        let mut away = FAR;
+        for j in 0..SIDE {
+            away = if mask[j * SIDE + i] { 0.0 } else { away + 1.0 };
+            column[j * SIDE + i] = away.min(FAR);
+        }
+        away = FAR;
+        for j in (0..SIDE).rev() {
+            away = if mask[j * SIDE + i] { 0.0 } else { away + 1.0 };
+            column[j * SIDE + i] = column[j * SIDE + i].min(away);
+        }
+    }
+    let mut all = Vec::with_capacity(CELLS);
+    for row in column.chunks_exact(SIDE) {
+        for i in 0..SIDE {
+            let near2 = row.iter().enumerate().fold(f32::MAX, |least, (n, &d)| {
+                let across = n as f32 - i as f32;
+                least.min(d * d + across * across)
+            });
+            all.push(near2.sqrt());
+        }
+    }
+    all
+}
+
 /// Spacing of the pairs of 4-neighbours for which `counted` is true.
 pub fn spacing(positions: &[Vec3], counted: impl Fn(usize, usize) -> bool) -> Spacing {
     let (mut sum, mut squares, mut pairs) = (0.0, 0.0, 0usize);
@@ -156,6 +186,30 @@ impl Grid {
     }
 }
 
+impl NormalGrid {
+    /// How rough the known cells are, in cells: the size of the noise that would give their third differences along u and v, which folds hardly
+    /// show in. Root mean square over the smaller 95 % of them, so that a spike of the scan does not count; 0 where no four cells in a row are known.
+    pub fn roughness(&self) -> f64 {
+        let known = |k: usize| self.known[k] > 0.5;
+        let at = |k: usize| Vec3::from(self.positions[k].map(f64::from));
+        let along = |step: usize, room: fn(usize) -> usize| {
+            let whole = move |k: &usize| room(*k) > 3 && (0..4).all(|n| known(k + n * step));
+            let starts = (0..CELLS).filter(whole);
+            starts.map(move |k| {
+                let [a, b, c, d] = [0, 1, 2, 3].map(|n| at(k + n * step));
+                (a - b * 3.0 + c * 3.0 - d).norm_squared()
+            })
+        };
+        let rows = along(1, |k| SIDE - k % SIDE);
+        let mut squares: Vec<f64> = rows.chain(along(SIDE, |k| SIDE - k / SIDE)).collect();
+        squares.sort_unstable_by(f64::total_cmp);
+        squares.truncate(squares.len().div_ceil(20) * 19);
+        // A third difference of independent noise has 1 + 9 + 9 + 1 times its variance, on each of three axes.
+        let variance = squares.iter().sum::<f64>() / (60 * squares.len().max(1)) as f64;
+        variance.sqrt() * SIDE as f64
+    }
+}
+
 impl Normalisation {
     /// A position in scene space, in the network's units.
     #[inline]
@@ -183,6 +237,18 @@ pub fn evaluate(positions: &[Vec3], uv: Vec2) -> Vec3 {
         }
     }
     sum
+}
+
+/// Bilinear interpolation of numbers, one per cell, at a uv; constant beyond the outermost cell centres.
+pub fn interpolate(values: &[f64], uv: Vec2) -> f64 {
+    let place = |x: f64| {
+        let s = (x * SIDE as f64 - 0.5).clamp(0.0, (SIDE - 1) as f64);
+        let base = (s.floor() as usize).min(SIDE - 2);
+        (base, s - base as f64)
+    };
+    let ((i, s), (j, t)) = (place(uv.x), place(uv.y));
+    let row = |j: usize| values[cell_index(i, j)] * (1.0 - s) + values[cell_index(i + 1, j)] * s;
+    row(j) * (1.0 - t) + row(j + 1) * t
 }
 
 /// Weights and indices of the four samples around place `s` on a line of `side` ≥ 2 samples, which lie at 0, 1, 2 and so on.
@@ -217,10 +283,32 @@ mod tests {
 
     proptest! {
         #[test]
+        fn distances_are_what_a_search_over_all_cells_finds(
+            mask in prop::collection::btree_set(0..CELLS, 1..60), cell in 0..CELLS,
+        ) {
+            let apart = |k: &usize| {
+                let along = |a: usize, b: usize| a as f32 - b as f32;
+                along(k % SIDE, cell % SIDE).hypot(along(k / SIDE, cell / SIDE))
+            };
+            let nearest = mask.iter().map(apart).fold(f32::MAX, f32::min);
+            let flags: Vec<bool> = (0..CELLS).map(|k| mask.contains(&k)).collect();
+            prop_assert!((distances_to(&flags)[cell] - nearest).abs() < 1e-4);
+        }
+
+        #[test]
         fn evaluation_reproduces_an_affine_sheet(u in 0.0..1.0f64, v in 0.0..1.0f64) {
             let (a, b, c) = (Vec3::new(1.0, -2.0, 0.5), Vec3::new(3.0, 0.1, -1.0), Vec3::new(0.0, 2.0, 4.0));
             let at = evaluate(&plane(a, b, c), Vec2::new(u, v));
             prop_assert!((at - (a + b * u + c * v)).norm() < 1e-12);
+        }
+
+        #[test]
+        fn interpolation_reproduces_a_ramp(u in 0.01..0.99f64, v in 0.01..0.99f64) {
+            let ramp: Vec<f64> = (0..CELLS).map(cell_centre).map(|uv| 2.0 * uv.x - 3.0 * uv.y + 1.0).collect();
+            let found = interpolate(&ramp, Vec2::new(u, v));
+            let half = 0.5 / SIDE as f64;
+            let clamped = [u, v].map(|x| x.clamp(half, 1.0 - half));
+            prop_assert!((found - (2.0 * clamped[0] - 3.0 * clamped[1] + 1.0)).abs() < 1e-12);
         }
 
         #[test]
@@ -238,6 +326,50 @@ mod tests {
             let mean = spacing(&q, |a, b| grid.known[a] && grid.known[b]).mean;
             prop_assert!((mean * 64.0 - 1.0).abs() < 1e-4);
         }
+    }
+
+    #[test]
+    fn roughness_is_the_size_of_noise_and_zero_on_a_bend() {
+        let bend = |k: usize| {
+            let uv = cell_centre(k);
+            Vec3::new(0.5 * (2.0 * uv.x).sin(), uv.y, 0.5 * (2.0 * uv.x).cos())
+        };
+        // Sums of twelve uniform numbers, deviation 1.
+        let mut state = 9u64;
+        let mut uniform = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let mut normal = || (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
+        for sigma in [0.0, 0.05, 0.3] {
+            let grid = NormalGrid {
+                positions: (0..CELLS)
+                    .map(|k| {
+                        let noise = Vec3::from_fn(|_, _| normal()) * (sigma / SIDE as f64);
+                        (bend(k) + noise).cast::<f32>().into()
+                    })
+                    .collect(),
+                known: (0..CELLS)
+                    .map(|k| f32::from(u8::from(k % 31 != 0)))
+                    .collect(),
+                base: None,
+            };
+            // The largest 5 % are left out.
+            let found = grid.roughness();
+            assert!(
+                (found - 0.9 * sigma).abs() < 0.1 * sigma + 1e-3,
+                "{found} of {sigma}"
+            );
+        }
+        let mut nothing = Grid::unknown().normalised(&Normalisation {
+            centre: Vec3::zeros(),
+            scale: 1.0,
+        });
+        assert_eq!(nothing.roughness(), 0.0);
+        nothing.known[0] = 1.0;
+        assert_eq!(nothing.roughness(), 0.0);
     }
 
     #[test]

@@ -9,6 +9,7 @@ use super::accessor::Accessor;
 use super::error::ScanError;
 use super::json::JsonPlace;
 use super::limits::{Limit, ScanLimits};
+use super::patch_group::CONFIDENCE;
 use super::primitive::{AttributeSource, ElementsKey, PrimitiveSource};
 use super::skin::{Influence, Influences};
 
@@ -115,6 +116,20 @@ impl<'d> AttributeReader<'d> {
             Ok(Some((kind, set)))
         })?;
         Ok(sets.into_iter().unzip())
+    }
+
+    /// How far the vertices of one of darn's own primitives may be off. `None` without `_CONFIDENCE`, and where another program made something else of
+    /// it: nothing depends on it but pictures.
+    pub fn deviations(
+        &mut self,
+        source: &PrimitiveSource<'_, '_>,
+        vertices: usize,
+    ) -> Option<Arc<[f32]>> {
+        let found = source.attribute(CONFIDENCE).ok()??;
+        let accessor = self.attribute(&found, &[Type::Scalar]).ok()?;
+        let values = accessor.floats([0.0]).ok()?.into_iter();
+        let values: Arc<[f32]> = values.map(|[x]| finite_or_zero(x).max(0.0)).collect();
+        (values.len() == vertices).then_some(values)
     }
 
     /// The sets of joints and weights, up to the first set that lacks one of the two.

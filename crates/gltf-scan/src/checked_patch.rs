@@ -38,6 +38,8 @@ pub(super) struct PatchKind {
     texcoords: usize,
     /// Channels of each colour set.
     colors: Vec<usize>,
+    /// Whether it is known how far vertices may be off.
+    deviations: bool,
     /// Sets of joints and weights.
     influences: usize,
     targets: usize,
@@ -118,6 +120,7 @@ impl<'s> CheckedPatch<'s> {
             normals: self.look.normals.is_some(),
             texcoords: self.patch.texcoords.len(),
             colors: kinds.map(|kind| kind.multiplicity()).collect(),
+            deviations: !self.patch.deviations.is_empty(),
             influences: self.skinning.len(),
             targets: self.home.targets,
         }
@@ -217,6 +220,12 @@ fn check_values(patch: &PatchPrimitive, look: &ScanPart) -> Result<(), String> {
         if texels == 0 || !own.tangents.iter().flatten().all(|x| x.is_finite()) {
             return Err("an image without texels, or a tangent that is not finite".into());
         }
+    }
+    if !patch.deviations.is_empty() {
+        expect_count(patch.deviations.len(), n, "deviations")?;
+    }
+    if !patch.deviations.iter().all(|x| x.is_finite()) {
+        return Err("a deviation is not finite".into());
     }
     for set in &patch.texcoords {
         expect_count(set.len(), n, "texture coordinates")?;

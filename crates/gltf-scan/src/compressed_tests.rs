@@ -108,6 +108,7 @@ fn a_patch_is_plain_and_the_compressed_bytes_stay() {
         let scan = read(&bytes).unwrap();
         let patch = PatchPrimitive {
             name: "patch".into(),
+            deviations: Vec::new(),
             part: 0,
             material_of: 0,
             points: vec![

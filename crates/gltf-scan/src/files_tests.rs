@@ -42,6 +42,7 @@ fn read(gltf: &[u8], files: Siblings) -> Result<Scan, ScanError> {
 fn patch() -> PatchPrimitive {
     PatchPrimitive {
         name: "patch".into(),
+        deviations: Vec::new(),
         part: 0,
         material_of: 0,
         points: vec![

@@ -348,6 +348,7 @@ mod tests {
             colors: Vec::new(),
             appearance: super::super::PatchAppearance::Continued,
             name: "darn reconstruction, hole 0".into(),
+            deviations: Vec::new(),
             hole,
             method: serde_json::Map::new(),
         }

@@ -29,6 +29,9 @@ pub struct PatchPrimitive {
     pub texcoords: Vec<Vec<[f32; 2]>>,
     /// Colour sets, linear RGBA.
     pub colors: Vec<Vec<[f32; 4]>>,
+    /// How far each vertex may be off, a standard deviation in scene units, `[points.len()]`; empty where that is not known. Written as the attribute
+    /// `_CONFIDENCE`.
+    pub deviations: Vec<f32>,
     /// How it looks.
     pub appearance: PatchAppearance,
     /// Name of the new accessors and buffer views, if it has a primitive of its own.

@@ -318,6 +318,10 @@ impl<'d, 'a> ScanReader<'d, 'a> {
         let skinning = skinned
             .then(|| self.attributes.influences(&source, count))
             .transpose()?;
+        let reconstructed = is_reconstructed(place.value.get("extras"));
+        let deviations = (reconstructed)
+            .then(|| self.attributes.deviations(&source, count))
+            .flatten();
         let material = match place.get("material")? {
             Some(reference) => Some(self.document.root.referred("materials", &reference)?.0),
             None => None,
@@ -332,7 +336,8 @@ impl<'d, 'a> ScanReader<'d, 'a> {
             texcoords,
             colors,
             normals,
-            reconstructed: is_reconstructed(place.value.get("extras")),
+            deviations,
+            reconstructed,
             hatch: (place.value.pointer("/extras/darn/hatch"))
                 .and_then(|set| usize::try_from(set.as_u64()?).ok()),
             shared: instance.shared,

@@ -65,6 +65,8 @@ pub struct ScanPart {
     pub colors: Vec<Arc<[[f32; 4]]>>,
     /// NORMAL as stored (quantized ones with length 1), in the node's space, `[vertices.len()]`; without normals the primitive is drawn flat.
     pub normals: Option<Arc<[[f32; 3]]>>,
+    /// `_CONFIDENCE` of a part that darn made, `[vertices.len()]`: how far each vertex may be off, a standard deviation in scene units.
+    pub deviations: Option<Arc<[f32]>>,
     /// Whether darn made it: its `extras.darn.reconstructed` says so.
     pub reconstructed: bool,
     /// The set of texture coordinates that the hatch of darn's marks has here, if darn made it.

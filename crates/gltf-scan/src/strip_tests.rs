@@ -26,6 +26,7 @@ fn patch(scan: &Scan, part: usize, id: u32) -> PatchPrimitive {
     let first = look.vertices.start;
     PatchPrimitive {
         name: "patch".into(),
+        deviations: Vec::new(),
         part,
         material_of: part,
         points: vec![

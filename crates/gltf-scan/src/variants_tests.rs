@@ -21,6 +21,7 @@ fn patch(scan: &Scan, part: usize) -> PatchPrimitive {
     let first = look.vertices.start;
     PatchPrimitive {
         name: "patch".into(),
+        deviations: Vec::new(),
         part,
         material_of: part,
         points: vec![

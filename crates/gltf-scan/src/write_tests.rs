@@ -35,6 +35,7 @@ fn tent(scan: &Scan, part: usize, top: Vec3) -> PatchPrimitive {
         texcoords: vec![vec![[0.25, 0.5]; 4]; look.texcoords.len()],
         colors: vec![vec![[0.1, 0.2, 0.3, 0.4]; 4]; look.colors.len()],
         name: "hole 0".into(),
+        deviations: Vec::new(),
         hole: object(json!({"id": 0})),
         method: object(json!({"weights": {"name": "standard"}})),
     }
@@ -438,6 +439,35 @@ fn all_patches_and_later_mends_share_one_copy_of_a_material() {
 }
 
 #[test]
+fn deviations_are_an_attribute_and_patches_without_them_stay_apart() {
+    let scan = read(&Builder::square().glb());
+    let plain = tent(&scan, 0, Vec3::z());
+    let sure = PatchPrimitive {
+        deviations: vec![0.0, 0.0, 0.0, 0.25],
+        ..plain.clone()
+    };
+    let written = scan.write(&[sure.clone(), plain, sure]).unwrap();
+    let (document, _) = parsed(&written);
+    let primitives = document["meshes"][0]["primitives"].as_array().unwrap();
+    let [.., with, without] = &primitives[..] else {
+        panic!("{} primitives", primitives.len());
+    };
+    let index = with["attributes"]["_CONFIDENCE"].as_u64().unwrap() as usize;
+    assert_eq!(document["accessors"][index]["count"], 8);
+    assert_eq!(document["accessors"][index]["type"], "SCALAR");
+    let said = &with["extras"]["darn"]["confidence"];
+    assert_eq!(said["attribute"], "_CONFIDENCE");
+    assert!(without["attributes"].get("_CONFIDENCE").is_none());
+    assert!(without["extras"]["darn"].get("confidence").is_none());
+    let again = read(&written);
+    let found = again.parts.iter().find_map(|part| part.deviations.clone());
+    assert_eq!(
+        &found.unwrap()[..],
+        [0.0, 0.0, 0.0, 0.25, 0.0, 0.0, 0.0, 0.25]
+    );
+}
+
+#[test]
 fn a_patch_that_contradicts_itself_is_refused() {
     let scan = read(&Builder::square().glb());
     let good = tent(&scan, 0, Vec3::z());
@@ -456,6 +486,14 @@ fn a_patch_that_contradicts_itself_is_refused() {
         },
         PatchPrimitive {
             texcoords: vec![vec![]],
+            ..good.clone()
+        },
+        PatchPrimitive {
+            deviations: vec![0.5],
+            ..good.clone()
+        },
+        PatchPrimitive {
+            deviations: vec![f32::NAN; 4],
             ..good.clone()
         },
         PatchPrimitive {

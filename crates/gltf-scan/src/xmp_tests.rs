@@ -13,6 +13,7 @@ fn mended(bytes: &[u8]) -> (Vec<u8>, Value) {
     let scan = Scan::read(bytes.to_vec(), &ScanLimits::default()).unwrap();
     let patch = PatchPrimitive {
         name: "patch".into(),
+        deviations: Vec::new(),
         part: 0,
         material_of: 0,
         points: vec![

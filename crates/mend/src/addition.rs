@@ -65,6 +65,7 @@ impl PatchSource<'_> {
         let FilledHole {
             hole,
             patch,
+            deviations,
             report,
         } = filled;
         let region = hole.region();
@@ -171,6 +172,7 @@ impl PatchSource<'_> {
                 .collect(),
             texcoords: texcoords.collect(),
             colors: colors.collect(),
+            deviations: at_corners(deviations, &dressed.corners),
             name: format!("darn reconstruction of hole {}", report.id),
             hole: hole_record(report),
             method: method_record(report, card),
@@ -219,6 +221,7 @@ impl PatchSource<'_> {
                 .collect(),
             texcoords: Vec::new(),
             colors: Vec::new(),
+            deviations: at_corners(&filled.deviations, &whole.corners),
             faces: whole.faces.clone(),
             ..dressed.primitive.clone()
         };
@@ -233,6 +236,13 @@ fn point(corner: &Corner, patch: &Patch) -> PatchPoint {
         Some(s) if s != NO_VERTEX => PatchPoint::Scan(s),
         _ => PatchPoint::New(patch.positions[corner.vertex as usize]),
     }
+}
+
+/// The deviations of a patch's vertices at its corners; none where they are not known.
+fn at_corners(deviations: &[f32], corners: &[Corner]) -> Vec<f32> {
+    let each = corners.iter();
+    each.filter_map(|corner| deviations.get(corner.vertex as usize).copied())
+        .collect()
 }
 
 /// Bytes of memory of a patch: as columns, as a primitive, and in the answer.
@@ -310,6 +320,12 @@ fn hole_record(report: &v1::HoleReport) -> Map<String, Value> {
         "selfIntersections": patch.self_intersections,
     });
     said.insert("patch".into(), numbers);
+    if patch.alternative > 0 {
+        said.insert("alternative".into(), json!(patch.alternative));
+    }
+    if let Some(confidence) = patch.confidence {
+        said.insert("confidence".into(), json!(confidence));
+    }
     said
 }
 

@@ -107,6 +107,7 @@ impl FairHole {
             network_share: 0.0,
             edited: false,
             constraints: None,
+            unedited: None,
             timings: self.timings,
         })
     }

@@ -1,11 +1,12 @@
 //! Fills one hole: the patch that a request's constraints and the network give it.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use crate::constraints::HoleConstraints;
 use crate::context::{HoleContext, Pace};
 use crate::error::MendError;
-use crate::hole::PatchPulls;
+use crate::hole::{PatchPulls, UneditedCloth};
 use crate::prepared_hole::HoleRef;
 use crate::select::HoleRequest;
 use crate::timings::milliseconds;
@@ -28,6 +29,8 @@ pub struct PatchDraft<'a> {
     pub edited: bool,
     /// What the patch should keep to; `None` for a hole without a chart.
     pub constraints: Option<HoleConstraints<'a>>,
+    /// The hole's cloth without constraints; `None` for a hole without a chart.
+    pub unedited: Option<Arc<UneditedCloth>>,
     /// Milliseconds so far.
     pub timings: v1::HoleTimings,
 }
@@ -63,6 +66,7 @@ impl<'a> HoleContext<'a> {
             network_share: unedited.network_share,
             edited: request.is_edited(),
             constraints: Some(constraints),
+            unedited: Some(Arc::clone(unedited)),
             timings,
         })
     }

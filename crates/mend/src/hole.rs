@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
+use crate::confidence::{FillEvidence, smooth_deviations};
 use crate::edit::{HoleCells, ReachLimit};
 use crate::error::MendError;
 use crate::inpainter::{FillKey, Inpainter};
@@ -26,6 +27,8 @@ const MAX_UNEDITED: usize = 4;
 
 /// Nanoseconds of work of the network for one hole.
 const FILL_WORK: u64 = 20_000_000;
+/// The same for one of the other plausible fills, beside the likeliest.
+const ALTERNATIVE_WORK: u64 = 2 * FILL_WORK;
 
 /// A hole ready to be filled.
 pub struct Hole {
@@ -79,6 +82,10 @@ pub struct UneditedCloth {
     pub predicted: Vec<Vec3>,
     /// For every cell the scan's position where it is known, the network's elsewhere; scene space.
     pub filled: Vec<Vec3>,
+    /// Which of the plausible fills it is, 0 the likeliest.
+    pub alternative: u8,
+    /// How far every cell may be off, a standard deviation in the network's units; `None` for weights that were not calibrated.
+    pub deviations: Option<Vec<f64>>,
     /// What the network says of the cells that were moved last.
     pub held: LastHeldFill,
     /// The last patch of a drag.
@@ -89,6 +96,18 @@ pub struct UneditedCloth {
     pub net_ms: f64,
     /// Milliseconds of meshing.
     pub patch_ms: f64,
+}
+
+/// A fill of the grid, in the network's units.
+struct GridFill {
+    /// One position per cell.
+    positions: Vec<[f32; 3]>,
+    /// The share of the network's movement in it.
+    network_share: f32,
+    /// Which of the plausible fills it is.
+    alternative: u8,
+    /// As in [`UneditedCloth`].
+    deviations: Option<Vec<f64>>,
 }
 
 /// What pulls at a patch.
@@ -143,8 +162,13 @@ impl Hole {
 
     fn fill(&self, inpainter: &Inpainter, call: Call) -> Result<UneditedCloth, MendError> {
         let started = Instant::now();
-        let (answer, network_share) = self.answer(inpainter, call)?;
-        let predicted = self.in_scene(&answer);
+        let GridFill {
+            positions,
+            network_share,
+            alternative,
+            deviations,
+        } = self.answer(inpainter, call)?;
+        let predicted = self.in_scene(&positions);
         let net_ms = milliseconds(started);
         let started = Instant::now();
         let filled = self.filled(&predicted);
@@ -153,6 +177,8 @@ impl Hole {
             network_share,
             predicted,
             filled,
+            alternative,
+            deviations,
             held: LastHeldFill::default(),
             strain: LastStrain::default(),
             patch,
@@ -161,13 +187,20 @@ impl Hole {
         })
     }
 
-    /// The fill of all cells in the network's units, and the share of the network's movement in it.
-    fn answer(&self, inpainter: &Inpainter, call: Call) -> Result<(Vec<[f32; 3]>, f32), MendError> {
+    /// The fill of all cells.
+    fn answer(&self, inpainter: &Inpainter, call: Call) -> Result<GridFill, MendError> {
         let widened = WidenedHole::new(self, call.budget)?;
+        let errors = inpainter.card().errors.as_ref();
         if widened.is_smooth()
             && let Some(fair) = widened.fair_fill(call.budget)?
         {
-            return Ok((fair, 0.0));
+            let off = widened.plate_error().unwrap_or(0.0);
+            return Ok(GridFill {
+                positions: fair,
+                network_share: 0.0,
+                alternative: 0,
+                deviations: errors.map(|_| smooth_deviations(&self.grid.known, off)),
+            });
         }
         call.budget.spend(FILL_WORK)?;
         let grid = self.normal_grid();
@@ -176,15 +209,42 @@ impl Hole {
             || widened.network_share(inpainter, call.budget),
         );
         let (answers, network_share) = (answers?, network_share?);
-        let mut answer = answers.into_iter().next().unwrap_or_default();
+        let Some(mut answer) = answers.into_iter().next() else {
+            return Ok(GridFill {
+                positions: Vec::new(),
+                network_share,
+                alternative: 0,
+                deviations: None,
+            });
+        };
+        let evidence = FillEvidence {
+            grid: &grid,
+            spread: &answer.spread,
+            network_share: network_share.into(),
+            plate_error: widened.plate_error(),
+        };
+        let deviations = errors.map(|errors| evidence.deviations(errors));
+        let mut alternative = 0;
+        // Cloth that is all smooth surface has no folds that could be deeper.
+        if inpainter.key().alternative > 0 && network_share > 0.0 {
+            call.budget.spend(ALTERNATIVE_WORK)?;
+            if let Some(other) = inpainter.alternative(&grid)? {
+                (answer.positions, alternative) = (other, inpainter.key().alternative);
+            }
+        }
         if network_share < 1.0
             && let Some(fair) = widened.fair_fill(call.budget)?
         {
-            for (network, fair) in answer.iter_mut().zip(&fair) {
+            for (network, fair) in answer.positions.iter_mut().zip(&fair) {
                 (0..3).for_each(|d| network[d] = fair[d] + network_share * (network[d] - fair[d]));
             }
         }
-        Ok((answer, network_share))
+        Ok(GridFill {
+            positions: answer.positions,
+            network_share,
+            alternative,
+            deviations,
+        })
     }
 
     /// A network's answer for all cells, in scene space.
@@ -270,7 +330,7 @@ impl UneditedCloths {
         let kept = self.lock();
         let each = kept.iter().map(|(_, u)| {
             let patch = 40 * u.patch.positions.len() + 12 * u.patch.faces.len();
-            3 * 24 * CELLS + patch + u.strain.bytes()
+            (3 * 24 + 8) * CELLS + patch + u.strain.bytes()
         });
         each.sum()
     }

@@ -5,6 +5,7 @@ use std::time::Instant;
 use darn_budget::{Budget, Exhausted, Steps};
 use rstar::{PointDistance as _, RTree};
 
+use crate::confidence;
 use crate::doubts::doubts;
 use crate::error::MendError;
 use crate::fair_hole::FairHole;
@@ -35,6 +36,8 @@ pub struct FilledHole<'a> {
     pub hole: HoleRef<'a>,
     /// The triangles.
     pub patch: Patch,
+    /// How far each of its vertices may be off, a standard deviation in scene units; empty where that is not known.
+    pub deviations: Vec<f32>,
     /// The report.
     pub report: v1::HoleReport,
 }
@@ -54,6 +57,7 @@ impl<'a> PatchDraft<'a> {
             patch,
             network_share,
             constraints,
+            unedited,
             mut timings,
             ..
         } = self;
@@ -62,6 +66,13 @@ impl<'a> PatchDraft<'a> {
         let started = Instant::now();
         let quality = quality::measure(&patch, hole.region());
         timings.report = milliseconds(started);
+        let (mut deviations, mut confidence) = (Vec::new(), None);
+        let alternative = unedited.as_ref().map_or(0, |unedited| unedited.alternative);
+        if let Some((hole, unedited)) = hole.charted().zip(unedited) {
+            deviations = hole.vertex_deviations(&unedited, &patch);
+            let new = deviations.get(patch.rim.len()..).unwrap_or_default();
+            confidence = confidence::report(new, hole.extent());
+        }
         let mut notes = notes(hole, &quality);
         notes.extend(loose_pieces_note(hole, &patch, welded, budget)?);
         notes.extend(constraints.iter().flat_map(|c| c.notes(&kept.anchors)));
@@ -75,6 +86,8 @@ impl<'a> PatchDraft<'a> {
             grid: hole.charted().map(|hole| hole.report),
             patch: Some(v1::PatchReport {
                 network_share: f64::from(network_share),
+                confidence,
+                alternative: alternative.into(),
                 ..patch_report(hole, &patch, &quality)
             }),
             // Written with the scan.
@@ -90,6 +103,7 @@ impl<'a> PatchDraft<'a> {
         Ok(FilledHole {
             hole,
             patch,
+            deviations,
             report,
         })
     }
@@ -230,6 +244,7 @@ fn notes(hole: HoleRef, quality: &Quality) -> Vec<String> {
     }
     if let Some(hole) = hole.charted() {
         notes.extend(rim_notes(hole));
+        notes.extend(hole.extent_note());
     }
     let most = hole.charted().map_or(1.0, |hole| hole.chart.stretch_max);
     if most > SUSPICIOUS {

@@ -4,7 +4,8 @@ use crate::error::MendError;
 use darn_contract::{FieldError, v1};
 use darn_geometry::grid::NormalGrid;
 use darn_net::{
-    AnchorLoss, AnchorProblem, Averaging, FillRequest, NetError, Network, Networks, WeightsCard,
+    AnchorLoss, AnchorProblem, Averaging, FillRequest, FilledGrid, NetError, Network, Networks,
+    WeightsCard,
 };
 
 /// Name of the network for a request that gives an up direction and names no weights.
@@ -24,6 +25,8 @@ pub struct Inpainter<'a> {
 pub struct FillKey {
     name: String,
     up: Option<[f64; 3]>,
+    /// Which of the plausible fills it answers with, 0 the likeliest.
+    pub alternative: u8,
 }
 
 impl<'a> Inpainter<'a> {
@@ -69,9 +72,28 @@ impl<'a> Inpainter<'a> {
             key: FillKey {
                 name: name.clone(),
                 up,
+                alternative: 0,
             },
             note,
         })
+    }
+
+    /// The same inpainter, for another of the plausible fills.
+    pub fn with_alternative(mut self, alternative: u8) -> Self {
+        self.key.alternative = alternative;
+        self
+    }
+
+    /// The fill of a grid that was asked for; network's units. `None` where there is none.
+    ///
+    /// # Errors
+    /// What [`Network::fill`] refuses.
+    pub fn alternative(&self, grid: &NormalGrid) -> Result<Option<Vec<[f32; 3]>>, NetError> {
+        if self.key.alternative == 0 {
+            return Ok(None);
+        }
+        let fills = self.network.alternatives(grid, self.key.up)?;
+        Ok(fills.into_iter().nth(self.key.alternative.into()))
     }
 
     /// What decides its answers.
@@ -93,7 +115,7 @@ impl<'a> Inpainter<'a> {
         }
     }
 
-    /// Predicts every cell of every grid, in the network's units; one list of 4096 positions for each grid.
+    /// Predicts every cell of every grid, in the network's units.
     ///
     /// # Errors
     /// What [`Network::fill`] refuses.
@@ -101,7 +123,7 @@ impl<'a> Inpainter<'a> {
         &self,
         grids: &[NormalGrid],
         averaging: Averaging,
-    ) -> Result<Vec<Vec<[f32; 3]>>, NetError> {
+    ) -> Result<Vec<FilledGrid>, NetError> {
         self.network.fill(&FillRequest {
             grids,
             up: self.key.up,

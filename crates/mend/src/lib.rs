@@ -6,7 +6,8 @@
 //! `prepare` lays the cloth around a hole flat and makes a `hole` of it (a `prepared_hole` is this, or a `fair_hole` where
 //! the cloth cannot be laid flat), `constraints` places anchors and gestures on
 //! it, `moved_fill` asks the network for cloth that moved, `fill_hole` meshes it, `separate` pushes neighbouring
-//! patches apart, `hole_report` measures the patch, `addition` writes it in glTF terms, and `texture` gives it its colour. `scan_holes` runs these
+//! patches apart, `hole_report` measures the patch, `confidence` says how far it
+//! may be off, `addition` writes it in glTF terms, and `texture` gives it its colour. `scan_holes` runs these
 //! stages for all holes of a scan; [`mend`] drops it, a [`ScanSession`] keeps it. `edit` holds the gestures and the
 //! anchor search. [`strip`] undoes mends. [`SharedMender`] is the port's [`Mender`](darn_contract::port::Mender).
 //!
@@ -18,6 +19,7 @@ mod anchor_search;
 mod bites;
 mod border;
 mod call_pools;
+mod confidence;
 mod constraints;
 mod context;
 mod cut;

@@ -70,7 +70,7 @@ impl HoleContext<'_> {
         let predicted = match self.call.mender.limits.edited_fill {
             EditedFill::Plain => {
                 let answers = self.inpainter.fill(&[given(1.0)], Averaging::Flips)?;
-                hole.in_scene(answers.first().map_or(&[], Vec::as_slice))
+                hole.in_scene(answers.first().map_or(&[], |a| a.positions.as_slice()))
             }
             EditedFill::Difference => {
                 let cells: Vec<usize> = moves.iter().map(|m| m.cell).collect();
@@ -78,7 +78,7 @@ impl HoleContext<'_> {
                 let mut grids = vec![given(1.0)];
                 grids.extend(held.is_none().then(|| given(0.0)));
                 let answers = self.inpainter.fill(&grids, Averaging::HalfTurn)?;
-                let mut answers = answers.iter().map(|a| hole.in_scene(a));
+                let mut answers = answers.iter().map(|a| hole.in_scene(&a.positions));
                 let moved = answers.next();
                 let held = held.or_else(|| Some(unedited.held.keep(cells, answers.next()?)));
                 let each = unedited.predicted.iter();

@@ -70,11 +70,15 @@ impl<'a> WidenedHole<'a> {
 
     /// Whether the plate is so right about the tested cells that no network is needed.
     pub fn is_smooth(&self) -> bool {
-        self.plate.as_ref().is_some_and(|plate| {
-            let off = self.tested.iter().map(|k| plate[*k] - self.scanned[*k]);
-            let square: f64 = off.map(|off| off.norm_squared()).sum();
-            !self.tested.is_empty() && square <= (SMOOTH * CELL).powi(2) * self.tested.len() as f64
-        })
+        self.plate_error().is_some_and(|off| off <= SMOOTH * CELL)
+    }
+
+    /// How far the plate is off about the tested cells: root mean square, network's units. `None` where nothing can be tested.
+    pub fn plate_error(&self) -> Option<f64> {
+        let plate = self.plate.as_ref()?;
+        let off = self.tested.iter().map(|k| plate[*k] - self.scanned[*k]);
+        let square: f64 = off.map(|off| off.norm_squared()).sum();
+        (!self.tested.is_empty()).then(|| (square / self.tested.len() as f64).sqrt())
     }
 
     /// The share, 0 to 1, of the network's movement from the plate that is worth keeping in the hole; 1 where that cannot be found out.
@@ -103,7 +107,7 @@ impl<'a> WidenedHole<'a> {
         };
         let answers = inpainter.fill(std::slice::from_ref(&widened), Averaging::Once)?;
         let share = answers.first().and_then(|answer| {
-            let answer = |k: usize| Vec3::from(answer[k].map(f64::from));
+            let answer = |k: usize| Vec3::from(answer.positions[k].map(f64::from));
             self.fitting_share(|k| plate[k], answer)
         });
         Ok(share.map_or(1.0, kept) as f32)

@@ -47,6 +47,8 @@ pub struct ScanHoles {
     weights: Option<String>,
     /// The up direction that the request gives.
     up: Option<[f64; 3]>,
+    /// Which of the plausible fills the request asks for.
+    alternative: u8,
 }
 
 /// The holes of a scan, filled for one request.
@@ -182,6 +184,7 @@ impl ScanHoles {
             selection,
             weights: constraints.weights.clone(),
             up: constraints.up,
+            alternative: constraints.alternative.unwrap_or(0),
         })
     }
 
@@ -263,7 +266,8 @@ impl ScanHoles {
         };
         let weights = later.weights.as_deref().or(self.weights.as_deref());
         let up = later.up.or(self.up);
-        let inpainter = Inpainter::choose(&call.mender.networks, weights, up)?;
+        let inpainter = Inpainter::choose(&call.mender.networks, weights, up)?
+            .with_alternative(later.alternative.unwrap_or(self.alternative));
         Ok((selection, inpainter))
     }
 
@@ -458,7 +462,8 @@ impl ScanHoles {
 
     /// What fills the holes unless a later request says otherwise.
     pub fn inpainter<'a>(&self, mender: &'a NetworkMender) -> Result<Inpainter<'a>, MendError> {
-        Inpainter::choose(&mender.networks, self.weights.as_deref(), self.up)
+        let chosen = Inpainter::choose(&mender.networks, self.weights.as_deref(), self.up)?;
+        Ok(chosen.with_alternative(self.alternative))
     }
 
     /// A prepared hole.

@@ -52,6 +52,7 @@ fn hole_described(
     let FilledHole {
         hole,
         patch,
+        deviations,
         report,
     } = filled_hole;
     let rim = patch.rim.len();
@@ -79,6 +80,7 @@ fn hole_described(
         known_cells: known.filter(|(known, _)| **known).map(|(_, k)| k).collect(),
         chart_side: hole.chart.frame.side,
         patch_uvs: patch.flat.iter().flat_map(uv).collect(),
+        patch_deviations: deviations.clone(),
         chart_png: png.into(),
         ..every
     })
@@ -134,7 +136,10 @@ fn hole_bytes(hole: &v1::SessionHole) -> usize {
         + hole.rim_uvs.len()
         + hole.grid_positions.len()
         + hole.patch_uvs.len();
-    let short = hole.hole_cells.len() + hole.known_cells.len() + hole.patch_faces.len();
+    let short = hole.patch_deviations.len()
+        + hole.hole_cells.len()
+        + hole.known_cells.len()
+        + hole.patch_faces.len();
     let surface = hole.surface.as_ref().map_or(0, |surface| {
         surface.vertices.len()
             + surface.faces.len()

@@ -17,8 +17,8 @@ use darn_geometry::mesh::shapes::holed_sheet;
 use darn_gltf_scan::export::{NewMesh, glb};
 use darn_gltf_scan::{Scan, ScanLimits};
 use darn_net::{
-    AnchorLoss, AnchorProblem, GridPlanes, NetError, Network, Networks, Runtime, TrainingCard,
-    UnetConfig, WeightsCard,
+    AnchorLoss, AnchorProblem, ErrorModel, GridPlanes, NetError, Network, Networks, Runtime,
+    TrainingCard, UnetConfig, WeightsCard,
 };
 
 /// Where the loss of every anchor is least for [`PlateRuntime`].
@@ -66,6 +66,11 @@ pub fn mender() -> &'static Arc<NetworkMender> {
             architecture: UnetConfig::default(),
             training: TrainingCard::default(),
             scores: Default::default(),
+            errors: Some(ErrorModel {
+                spread: 3.0,
+                roughness: 1.0,
+                growth: Vec::new(),
+            }),
             darn_version: String::new(),
         };
         let network = Network::of(card, Box::new(PlateRuntime), None);

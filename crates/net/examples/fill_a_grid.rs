@@ -27,7 +27,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     })?;
 
     let hole: Vec<usize> = (0..CELLS).filter(|cell| !known[*cell]).collect();
-    let distances = hole.iter().map(|&k| distance(filled[0][k], truth[k]));
+    let distances = hole
+        .iter()
+        .map(|&k| distance(filled[0].positions[k], truth[k]));
     // Neighbouring cells are 1/64 apart in the network's units.
     let mean = distances.sum::<f32>() / hole.len() as f32 * SIDE as f32;
     println!(

@@ -5,10 +5,12 @@
 //! [`engine`], or one of burn's backends, which `darn-lab` provides. This crate knows neither scene space nor constraints, and reads no
 //! files.
 
+mod alternatives;
 mod anchor;
 pub mod config;
 pub mod engine;
 mod error;
+mod error_model;
 pub mod fill;
 mod frame;
 mod network;
@@ -30,9 +32,10 @@ mod tests;
 pub use anchor::{AnchorLoss, AnchorProblem, SIGMA};
 pub use config::UnetConfig;
 pub use error::NetError;
+pub use error_model::{DepthGrowth, ErrorModel, WITHIN_90};
 pub use fill::{InputKind, plate, plates};
 pub use frame::{FrameKind, NetworkFrame};
-pub use network::{FillRequest, Network};
+pub use network::{FillRequest, FilledGrid, Network};
 pub use networks::Networks;
 pub use planes::{GridPlanes, cells, planes};
 pub use runtime::{EngineRuntime, Runtime};

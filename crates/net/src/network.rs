@@ -4,6 +4,7 @@ use darn_geometry::grid::{CELLS, NormalGrid};
 use darn_geometry::mesh::Vec3;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
+use crate::alternatives::{SYMMETRIES, around};
 use crate::anchor::{AnchorLoss, AnchorProblem};
 use crate::engine::EngineOptions;
 use crate::error::NetError;
@@ -36,6 +37,15 @@ pub struct FillRequest<'a> {
     pub up: Option<[f64; 3]>,
     /// The symmetries of the grid that the prediction is averaged over.
     pub averaging: Averaging,
+}
+
+/// A network's answer for one grid, in the network's units and the grid's own space.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FilledGrid {
+    /// One position per cell: the mean of the answers to the grid and its symmetries.
+    pub positions: Vec<[f32; 3]>,
+    /// How far these answers lie apart, one number per cell: their root mean square distance from the mean; zeros when only one was asked for.
+    pub spread: Vec<f32>,
 }
 
 impl Network {
@@ -87,14 +97,29 @@ impl Network {
     ///
     /// # Errors
     /// A grid of another size, or a prediction that is not finite.
-    pub fn fill(&self, request: &FillRequest) -> Result<Vec<Vec<[f32; 3]>>, NetError> {
-        check_sizes(request.grids)?;
-        let upright = self.upright(request.up);
-        let symmetries: Vec<Vec<usize>> = (request.averaging.symmetries().iter())
-            .map(|s| origins(*s))
-            .collect();
-        let mut copies = Vec::with_capacity(request.grids.len() * symmetries.len());
-        for grid in request.grids {
+    pub fn fill(&self, request: &FillRequest) -> Result<Vec<FilledGrid>, NetError> {
+        let FillRequest {
+            grids,
+            up,
+            averaging,
+        } = *request;
+        let answers = self.answers(grids, up, averaging.symmetries())?;
+        Ok(answers.iter().map(|alike| averaged(alike)).collect())
+    }
+
+    /// For each grid the answers to some of its symmetries, each in the grid's own cells and space.
+    fn answers(
+        &self,
+        grids: &[NormalGrid],
+        up: Option<[f64; 3]>,
+        symmetries: &[usize],
+    ) -> Result<Vec<Vec<Vec<[f32; 3]>>>, NetError> {
+        check_sizes(grids)?;
+        let upright = self.upright(up);
+        let back = upright.map(|upright| upright.transpose());
+        let symmetries: Vec<Vec<usize>> = symmetries.iter().map(|s| origins(*s)).collect();
+        let mut copies = Vec::with_capacity(grids.len() * symmetries.len());
+        for grid in grids {
             let grid = turned(grid, upright.as_ref());
             // The plate of a mirrored grid is the mirrored plate, so one is enough for all symmetries.
             let base = base_of(&self.card.architecture, &grid);
@@ -107,23 +132,39 @@ impl Network {
                 }
             }));
         }
-        let mut predictions = Vec::with_capacity(request.grids.len());
-        for alike in self.predict(&copies)?.chunks(symmetries.len()) {
-            let mut mean = vec![[0.0; 3]; CELLS];
-            for (answer, from) in alike.iter().zip(&symmetries) {
-                for (p, k) in answer.iter().zip(from) {
-                    (0..3).for_each(|axis| mean[*k][axis] += p[axis] / symmetries.len() as f32);
-                }
+        let answers = self.predict(&copies)?;
+        let own_cells = |(answer, from): (&Vec<[f32; 3]>, &Vec<usize>)| {
+            let mut cells = vec![[0.0; 3]; CELLS];
+            for (p, k) in answer.iter().zip(from) {
+                cells[*k] = back.as_ref().map_or(*p, |back| times(back, *p));
             }
-            predictions.push(mean);
-        }
-        if let Some(upright) = upright {
-            let back = upright.transpose();
-            for p in predictions.iter_mut().flatten() {
-                *p = times(&back, *p);
-            }
-        }
-        Ok(predictions)
+            cells
+        };
+        let alike = answers.chunks(symmetries.len());
+        Ok(alike
+            .map(|alike| alike.iter().zip(&symmetries).map(own_cells).collect())
+            .collect())
+    }
+
+    /// The plausible fills of a grid, the likeliest first: what [`Network::fill`] gives with [`Averaging::Flips`], then pairs on either side of it.
+    ///
+    /// The answers to the eight symmetries of the grid lie around their mean where the network is unsure; their principal directions are folds that
+    /// could be deeper or shallower. The fills of a pair lie two standard deviations along one direction, the one farther from the smooth base first;
+    /// the pairs follow the variance of their directions. `up` as in [`FillRequest`].
+    ///
+    /// # Errors
+    /// As [`Network::fill`].
+    pub fn alternatives(
+        &self,
+        grid: &NormalGrid,
+        up: Option<[f64; 3]>,
+    ) -> Result<Vec<Vec<[f32; 3]>>, NetError> {
+        let all: Vec<usize> = (0..SYMMETRIES).collect();
+        let answers = self.answers(std::slice::from_ref(grid), up, &all)?;
+        let answers = answers.into_iter().next().unwrap_or_default();
+        let flips = Averaging::Flips.symmetries().len();
+        let first = averaged(&answers[..flips]).positions;
+        Ok(around(first, &answers, grid))
     }
 
     /// The problem of the anchor search (paper §3.5) for a grid and a target, both in the network's units and the grid's space; `up` as in
@@ -206,6 +247,26 @@ impl Network {
         let known = self.card.architecture.frame.knows_up();
         up.filter(|_| known).map(upright)
     }
+}
+
+/// The mean of the answers to a grid's symmetries, and their spread.
+fn averaged(answers: &[Vec<[f32; 3]>]) -> FilledGrid {
+    let count = answers.len() as f32;
+    let mut positions = vec![[0.0; 3]; CELLS];
+    for answer in answers {
+        for (mean, p) in positions.iter_mut().zip(answer) {
+            (0..3).for_each(|axis| mean[axis] += p[axis] / count);
+        }
+    }
+    let mut spread = vec![0.0; CELLS];
+    for answer in answers {
+        for ((square, p), mean) in spread.iter_mut().zip(answer).zip(&positions) {
+            let off = Vector3::from(*p) - Vector3::from(*mean);
+            *square += off.norm_squared() / count;
+        }
+    }
+    spread.iter_mut().for_each(|square| *square = square.sqrt());
+    FilledGrid { positions, spread }
 }
 
 fn check_sizes(grids: &[NormalGrid]) -> Result<(), NetError> {

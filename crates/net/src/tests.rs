@@ -24,6 +24,7 @@ fn card(architecture: UnetConfig) -> WeightsCard {
         architecture,
         training: TrainingCard::default(),
         scores: [("rmse_cells".to_owned(), 1.25)].into(),
+        errors: None,
         darn_version: "0".into(),
     }
 }
@@ -48,11 +49,12 @@ fn zero_network() -> Network {
 
 /// Fills with one pass over each grid.
 fn filled(network: &Network, grids: &[NormalGrid]) -> Result<Vec<Vec<[f32; 3]>>, NetError> {
-    network.fill(&FillRequest {
+    let filled = network.fill(&FillRequest {
         grids,
         up: None,
         averaging: Averaging::Once,
-    })
+    })?;
+    Ok(filled.into_iter().map(|grid| grid.positions).collect())
 }
 
 /// A grid of a surface, unknown in the hole.

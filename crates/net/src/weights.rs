@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 
 use crate::config::UnetConfig;
 use crate::error::NetError;
+use crate::error_model::ErrorModel;
 
 pub use crate::tensors::NamedTensors;
 
@@ -30,6 +31,9 @@ pub struct WeightsCard {
     pub training: TrainingCard,
     /// Held-out scores by name, e.g. `rmse_cells`.
     pub scores: BTreeMap<String, f64>,
+    /// How far its answers may be off; `None` for weights that were not calibrated: their patches get no confidence.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub errors: Option<ErrorModel>,
     /// The version of darn that wrote the file.
     pub darn_version: String,
 }
@@ -70,6 +74,7 @@ pub struct TrainingCard {
 ///     architecture: UnetConfig::default(),
 ///     training: TrainingCard::default(),
 ///     scores: Default::default(),
+///     errors: None,
 ///     darn_version: "0.1.0".to_owned(),
 /// };
 /// let bytes = weights::write(&tensors, &card)?;

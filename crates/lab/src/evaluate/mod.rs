@@ -2,10 +2,13 @@
 //!
 //! [`run`] measures a network beside smooth fills and the truth on cases from [`draw`]; [`over_scans`] and
 //! [`over_garments`] measure scans and garments mended end to end;
+//! [`cell_errors`] measures errors beside what the network's answers show of them, and [`calibrated`] fits the weights' error model to them;
 //! [`of_samples`] and [`of_flattened`] compare the holes of training samples with those of flattened scans. The network and the mender are
 //! functions that the caller passes in, sheets come from the caller, and results are values: no files, no training, no HTTP.
 
+mod alternative_fills;
 mod cases;
+mod cell_errors;
 mod charts;
 mod error;
 mod garment_rows;
@@ -20,7 +23,13 @@ mod sweep;
 #[cfg(test)]
 mod tests;
 
+pub use alternative_fills::{
+    AlternativeFills, AlternativesFunction, alternative_fills, alternatives_table,
+};
 pub use cases::{EvaluationCase, HoleSize, draw};
+pub use cell_errors::{
+    CalibrationSets, CellError, ErrorCoverage, calibrated, cell_errors, coverage, coverage_table,
+};
 pub use charts::picture;
 pub use error::EvaluateError;
 pub use garment_rows::{

@@ -13,13 +13,14 @@ use darn_geometry::grid::{CELLS, Grid, NormalGrid, Normalisation};
 use darn_geometry::mesh::Vec3;
 use darn_geometry::patch::PatchOptions;
 use darn_geometry::smooth::{Smooth, smooth};
+use darn_net::FilledGrid;
 
 /// Grids given to the network at once.
 const CHUNK: usize = 16;
 
-/// Fills grids in the network's units: one list of `CELLS` positions for each grid.
+/// Fills grids in the network's units.
 pub type FillFunction<'a> =
-    &'a (dyn Fn(&[NormalGrid]) -> Result<Vec<Vec<[f32; 3]>>, EvaluateError> + Sync);
+    &'a (dyn Fn(&[NormalGrid]) -> Result<Vec<FilledGrid>, EvaluateError> + Sync);
 
 /// What is to be measured.
 #[derive(Debug, Clone)]
@@ -52,31 +53,44 @@ pub fn run(
         ..EvaluationReport::default()
     };
     for noise in &plan.noises {
-        for (number, chunk) in cases.chunks(CHUNK).enumerate() {
-            let first = number * CHUNK;
-            let observed = (first..)
-                .zip(chunk)
-                .map(|(k, case)| ObservedCase::of(k, case, *noise, plan.seed))
-                .collect::<Result<Vec<_>, _>>()?;
-            let inputs: Vec<NormalGrid> = (observed.iter())
-                .map(|case| case.grid.normalised(&case.normalisation))
-                .collect();
-            let answers = fill(&inputs)?;
-            let measured: Vec<Vec<FillOutcome>> = observed
-                .par_iter()
-                .zip(&answers)
-                .map(|(case, answer)| {
-                    let found = case.measured(answer, &plan.options);
-                    progress(1);
-                    found
-                })
-                .collect::<Result<_, _>>()?;
-            for (case, outcomes) in observed.iter().zip(measured) {
-                report.add(case, *noise, outcomes);
-            }
+        let measured = in_chunks(cases, *noise, plan.seed, fill, |case, answer| {
+            let found = case.measured(&answer.positions, &plan.options)?;
+            progress(1);
+            Ok((case.number, found))
+        })?;
+        for ((number, outcomes), case) in measured.into_iter().zip(cases) {
+            report.add(number, case, *noise, outcomes);
         }
     }
     Ok(report)
+}
+
+/// What `of` makes of every case and the network's answer to it, in order; some grids are given to the network at once.
+pub(super) fn in_chunks<T: Send>(
+    cases: &[EvaluationCase],
+    noise: f64,
+    seed: u64,
+    fill: FillFunction,
+    of: impl Fn(&ObservedCase, &FilledGrid) -> Result<T, EvaluateError> + Sync,
+) -> Result<Vec<T>, EvaluateError> {
+    let mut all = Vec::with_capacity(cases.len());
+    for (number, chunk) in cases.chunks(CHUNK).enumerate() {
+        let observed = (number * CHUNK..)
+            .zip(chunk)
+            .map(|(k, case)| ObservedCase::of(k, case, noise, seed))
+            .collect::<Result<Vec<_>, _>>()?;
+        let inputs: Vec<NormalGrid> = (observed.iter())
+            .map(|case| case.grid.normalised(&case.normalisation))
+            .collect();
+        let answers = fill(&inputs)?;
+        let made: Result<Vec<T>, _> = observed
+            .par_iter()
+            .zip(&answers)
+            .map(|(case, answer)| of(case, answer))
+            .collect();
+        all.extend(made?);
+    }
+    Ok(all)
 }
 
 /// The measurement of one fill at one stage; `None` when it could not be patched.
@@ -87,15 +101,19 @@ struct FillOutcome {
 }
 
 /// A case as a scan would show it.
-struct ObservedCase<'a> {
+pub(super) struct ObservedCase<'a> {
     number: usize,
-    case: &'a EvaluationCase,
-    grid: Grid,
-    normalisation: Normalisation,
+    /// The case.
+    pub case: &'a EvaluationCase,
+    /// What the scan shows.
+    pub grid: Grid,
+    /// Converts between the scan's space and the network's units.
+    pub normalisation: Normalisation,
 }
 
 impl<'a> ObservedCase<'a> {
-    fn of(
+    /// What a scan with noise of so many cells would show of a case; the noise is drawn from `seed` and the number of the case.
+    pub fn of(
         number: usize,
         case: &'a EvaluationCase,
         noise: f64,
@@ -166,7 +184,13 @@ impl<'a> ObservedCase<'a> {
 }
 
 impl EvaluationReport {
-    fn add(&mut self, observed: &ObservedCase, noise: f64, outcomes: Vec<FillOutcome>) {
+    fn add(
+        &mut self,
+        number: usize,
+        case: &EvaluationCase,
+        noise: f64,
+        outcomes: Vec<FillOutcome>,
+    ) {
         for outcome in outcomes {
             let FillOutcome { method, stage, .. } = outcome;
             let Some(measurement) = outcome.measurement else {
@@ -174,9 +198,9 @@ impl EvaluationReport {
                 continue;
             };
             self.rows.push(EvaluationRow {
-                case: observed.number,
-                shape: observed.case.shape,
-                size: observed.case.size,
+                case: number,
+                shape: case.shape,
+                size: case.size,
                 noise,
                 fill: method,
                 stage,

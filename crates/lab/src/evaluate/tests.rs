@@ -9,10 +9,11 @@ use super::*;
 use crate::scarffolds::masks::{self, MaskShape, SHAPES};
 use crate::scarffolds::samples::{SampleRotation, Sampler, TrainingSample};
 use crate::scarffolds::sheets::SimulatedSheet;
-use darn_geometry::grid::{CELLS, SIDE, cell_centre};
+use darn_geometry::grid::{CELLS, NormalGrid, SIDE, cell_centre};
 use darn_geometry::mesh::Vec3;
 use darn_geometry::patch::PatchOptions;
 use darn_geometry::smooth::{Smooth, smooth};
+use darn_net::FilledGrid;
 
 /// A case on a surface over the unit square, with a hole of the given shape.
 fn case(surface: impl Fn(f64, f64) -> Vec3, shape: MaskShape, seed: u64) -> EvaluationCase {
@@ -162,8 +163,12 @@ fn a_whole_evaluation_has_its_tables_and_pictures() {
         seed: 1,
         options: PatchOptions::default(),
     };
-    let zeros = |grids: &[darn_geometry::grid::NormalGrid]| {
-        Ok(grids.iter().map(|g| g.positions.clone()).collect())
+    let zeros = |grids: &[NormalGrid]| {
+        let unchanged = |grid: &NormalGrid| FilledGrid {
+            positions: grid.positions.clone(),
+            spread: vec![0.0; CELLS],
+        };
+        Ok(grids.iter().map(unchanged).collect())
     };
     let report = run(&cases, &plan, &zeros, &|_| ()).unwrap();
     assert_eq!(report.rows.len() + report.not_patched, 3 * 2 * 4 * 2);

@@ -3,7 +3,7 @@
 //! A hole takes about 0.3 to 0.65 of the grid's side, as in the regions that `flatten` cuts out, sometimes up to 0.88. It never touches the
 //! grid's border. A mask is `CELLS` flags in the grid's order, true in the hole.
 
-use darn_geometry::grid::{CELLS, SIDE};
+use darn_geometry::grid::{CELLS, SIDE, distances_to};
 use rand::Rng;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -101,7 +101,7 @@ fn place(rng: &mut impl Rng) -> f32 {
 
 /// Adds a second, smaller hole where there is room for it.
 fn beside(first: Vec<bool>, rng: &mut impl Rng) -> Vec<bool> {
-    let away = distance(&first);
+    let away = distances_to(&first);
     for _ in 0..20 {
         let middle = [0, 1].map(|_| rng.random_range(0.15..0.85) * SIDE as f32);
         let radius = rng.random_range(3.0..8.0);
@@ -334,35 +334,6 @@ fn fill_islands(mut mask: Vec<bool>) -> Vec<bool> {
     mask
 }
 
-/// Exact distance of every cell's centre from the nearest cell of the mask, in cells, computed by columns and then by rows.
-pub(super) fn distance(mask: &[bool]) -> Vec<f32> {
-    const FAR: f32 = 4.0 * SIDE as f32;
-    let mut column = vec![FAR; CELLS];
-    for i in 0..SIDE {
-        let mut away = FAR;
-        for j in 0..SIDE {
-            away = if mask[j * SIDE + i] { 0.0 } else { away + 1.0 };
-            column[j * SIDE + i] = away.min(FAR);
-        }
-        away = FAR;
-        for j in (0..SIDE).rev() {
-            away = if mask[j * SIDE + i] { 0.0 } else { away + 1.0 };
-            column[j * SIDE + i] = column[j * SIDE + i].min(away);
-        }
-    }
-    let mut all = Vec::with_capacity(CELLS);
-    for row in column.chunks_exact(SIDE) {
-        for i in 0..SIDE {
-            let near2 = row.iter().enumerate().fold(f32::MAX, |least, (n, &d)| {
-                let across = n as f32 - i as f32;
-                least.min(d * d + across * across)
-            });
-            all.push(near2.sqrt());
-        }
-    }
-    all
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -383,14 +354,6 @@ mod tests {
             }
             prop_assert_eq!(pieces(&mask).len(), 1);
             prop_assert_eq!(pieces(&inverted(&mask)).len(), if shape == MaskShape::Ring { 2 } else { 1 });
-        }
-
-        #[test]
-        fn distance_is_what_a_search_over_all_cells_finds(seed: u64, cell in 0..CELLS) {
-            let mask = draw(&mut ChaCha8Rng::seed_from_u64(seed)).1;
-            let apart = |k: usize| ((k % SIDE) as f32 - (cell % SIDE) as f32).hypot((k / SIDE) as f32 - (cell / SIDE) as f32);
-            let nearest = (0..CELLS).filter(|&k| mask[k]).map(apart).fold(f32::MAX, f32::min);
-            prop_assert!((distance(&mask)[cell] - nearest).abs() < 1e-4);
         }
     }
 

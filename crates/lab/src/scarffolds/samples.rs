@@ -7,7 +7,7 @@
 use super::masks::{self, MaskShape};
 use super::sheet::SimulatedSheet;
 use super::spline::SheetSpline;
-use darn_geometry::grid::{CELLS, SIDE};
+use darn_geometry::grid::{CELLS, SIDE, distances_to};
 use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 use rand::Rng;
 
@@ -147,7 +147,7 @@ impl HoledSquare {
         let banded = rng.random_bool(BANDED);
         let (shape, hole) = masks::draw(rng);
         let hole = if banded { centred(&hole, rng) } else { hole };
-        let away = masks::distance(&hole);
+        let away = distances_to(&hole);
         let square = SheetSquare::around(&away, rng);
         let reach = if banded {
             region_edge(&hole, rng)

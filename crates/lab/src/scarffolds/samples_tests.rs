@@ -46,7 +46,7 @@ proptest! {
     fn every_rim_lies_on_the_sheet(seed: u64) {
         let sampler = Sampler::new(&[rolled(1.0)], SampleRotation::Any);
         let sample = sampler.alike(1, &mut ChaCha8Rng::seed_from_u64(seed)).remove(0);
-        let away = masks::distance(&sample.hole);
+        let away = distances_to(&sample.hole);
         for k in (0..CELLS).filter(|&k| away[k] > 0.0 && away[k] < 1.5) {
             prop_assert!(sample.known[k]);
         }

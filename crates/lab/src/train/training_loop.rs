@@ -174,6 +174,7 @@ fn write_weights(
             ),
         },
         scores: named_scores(scores),
+        errors: None,
         darn_version: env!("CARGO_PKG_VERSION").to_owned(),
     };
     let bytes = weights::write(&snapshot.averaged, &card)?;

@@ -28,6 +28,7 @@ pub(super) fn card(architecture: UnetConfig) -> WeightsCard {
         architecture,
         training: TrainingCard::default(),
         scores: [("rmse_cells".to_owned(), 1.25)].into(),
+        errors: None,
         darn_version: "0".into(),
     }
 }
@@ -58,11 +59,12 @@ pub(super) fn filled(
     network: &Network,
     grids: &[NormalGrid],
 ) -> Result<Vec<Vec<[f32; 3]>>, NetError> {
-    network.fill(&FillRequest {
+    let filled = network.fill(&FillRequest {
         grids,
         up: None,
         averaging: Averaging::Once,
-    })
+    })?;
+    Ok(filled.into_iter().map(|grid| grid.positions).collect())
 }
 
 /// Half a cylinder's bend with a round hole in the middle.
