@@ -924,6 +924,25 @@ export interface components {
             networkShare?: number;
             /** @description How the hole was filled: `network`, or `fair` where the cloth around it cannot be laid flat: a fair surface without folds, which takes no anchors and no gestures. */
             method?: string;
+            /** @description How far the new cloth may be from the cloth that was there; left out where that was never measured: without a chart, and for weights that were not calibrated. Of the cloth before anchors and gestures. */
+            confidence?: components["schemas"]["Confidence"];
+        };
+        /** @description How far the new vertices may be from the cloth that was there. Each has a standard deviation, in the scene's unit: nine of ten vertices lie within 1.645 deviations. The attribute `_CONFIDENCE` of the patch has them all. The grades say how wide that interval is against the hole's width. */
+        Confidence: {
+            /** @description Median of the deviations. */
+            median?: number;
+            /** @description Nine of ten deviations are no larger. */
+            p90?: number;
+            /** @description Share of the new vertices whose interval is at most 1 % of the hole's width. */
+            veryHigh?: number;
+            /** @description Above that, at most 2.5 %. */
+            high?: number;
+            /** @description Above that, at most 5 %. */
+            medium?: number;
+            /** @description Above that, at most 10 %. */
+            low?: number;
+            /** @description Above that. */
+            veryLow?: number;
         };
         /** @description How an anchor was kept. */
         AnchorReport: {
@@ -988,6 +1007,8 @@ export interface components {
             chartSide?: number;
             /** @description How the scan's own look goes on in the patch. */
             surface?: components["schemas"]["PatchSurface"];
+            /** @description How far each vertex of the patch may be from the cloth that was there, before anchors and gestures: a standard deviation in the scene's unit, 0 on the rim; empty where that was never measured. */
+            patchDeviations?: number[];
         };
         /** @description A patch as a surface to draw: the scan's texture coordinates and colours continued into it. Where the whole scan gets patches with images of their own, their texture coordinates are those of the patches as a GLB. */
         PatchSurface: {

@@ -12,6 +12,7 @@ export type AnchorLine = Schemas['AnchorLine'];
 export type AnchorQuery = Schemas['AnchorQuery'];
 export type Border = Schemas['Border'];
 export type BorderCandidate = Schemas['BorderCandidate'];
+export type Confidence = Schemas['Confidence'];
 export type Constraints = Schemas['Constraints'];
 export type Cut = Schemas['Cut'];
 export type Edit = Schemas['Edit'];
