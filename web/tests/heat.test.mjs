@@ -7,7 +7,8 @@ import { load } from './sources.mjs';
 const { weld } = await load('scene/boundary.ts');
 const { vertexNumbers } = await load('scene/curvature.ts');
 const { patchStretch, stretchAt, stretchCells } = await load('scene/stretch.ts');
-const { heatColors, scaleOf } = await load('scene/heat_colors.ts');
+const { patchDeviations } = await load('scene/deviations.ts');
+const { heatColors, ownColors, scaleOf } = await load('scene/heat_colors.ts');
 const { Middles, indexWithout } = await load('scene/cut_faces.ts');
 const { AnchorMap } = await load('model/anchor_map.ts');
 const { stretchBetween } = await load('scene/border_stretch.ts');
@@ -84,6 +85,39 @@ test('a scale is round and leaves only extremes out; the middle is light, unknow
   const [low, middle, high, unknown] = [0, 1, 2, 3].map((at) => colors.slice(3 * at, 3 * at + 3));
   assert.ok(low[2] > low[0] && high[0] > high[2]);
   assert.ok(Math.min(...middle) > 0.9 && Math.max(...unknown) < 0.3);
+});
+
+test('deviations belong to vertices, wherever these are; those of other patches are not known', () => {
+  const hole = { patchDeviations: [0, 0.25, 0.5] };
+  const moved = new Float32Array([0, 0, 0, 5, 0, 0, 0, 7, 0]);
+  for (const positions of [new Float32Array(9), moved]) {
+    assert.deepEqual([...patchDeviations({ hole, positions })], [0, 0.25, 0.5]);
+  }
+  for (const other of [{}, { patchDeviations: [] }, { patchDeviations: [0, 1] }]) {
+    assert.ok(patchDeviations({ hole: other, positions: moved }).every(Number.isNaN));
+  }
+});
+
+test('the less certain the darker, from 0 to the largest deviation; nothing known is grey', () => {
+  const extreme = Float32Array.from({ length: 1000 }, (_, k) => (k === 7 ? 4 : 0.001));
+  const unknown = new Float32Array(3).fill(Number.NaN);
+  const scale = scaleOf('confidence', [extreme, unknown]);
+  assert.equal(scale.most, 4);
+  const values = Float32Array.from({ length: 41 }, (_, k) => k / 10);
+  const colors = heatColors(values, new Float32Array(41).fill(1), scale);
+  const each = Array.from({ length: 41 }, (_, k) => [...colors.subarray(3 * k, 3 * k + 3)]);
+  const luminance = ([red, green, blue]) => 0.2126 * red + 0.7152 * green + 0.0722 * blue;
+  each.slice(1).forEach((color, k) => assert.ok(luminance(color) < luminance(each[k]), `step ${k + 1}`));
+  // The scale is yellow to everybody who sees yellow and blue apart, the greys are not.
+  assert.ok(each.every(([red, , blue]) => blue < 0.7 * red));
+  const greys = [heatColors(unknown, new Float32Array(3).fill(1), scale), ownColors(new Float32Array(1).fill(1))];
+  assert.ok(greys.every(([red, , blue]) => blue > red));
+  assert.ok(luminance(greys[1]) > 2 * luminance(greys[0]));
+  assert.ok(Number.isNaN(scaleOf('confidence', [unknown]).most) && Number.isNaN(scaleOf('confidence', []).most));
+  // Flat cloth is known to be certain.
+  const flat = scaleOf('confidence', [new Float32Array(3)]);
+  assert.equal(flat.most, 0);
+  assert.deepEqual([...heatColors(new Float32Array(1), new Float32Array(1).fill(1), flat)], each[0]);
 });
 
 test('triangles are taken out by their middles, and no others', () => {

@@ -260,6 +260,49 @@ inEditor(
   },
 );
 
+inEditor('confidence is shown as colours with a legend, which stay with their vertices', async (editor, page) => {
+  await editor.openExample();
+  await page.getByRole('radio', { name: 'Confidence' }).check();
+  const legend = page.getByRole('group', { name: 'Legend: Confidence' });
+  await legend.getByText(/Nothing is known/).waitFor();
+  await editor.mend();
+  await legend.getByText(/uncertain, 0\.\d/).waitFor();
+  assert.match(await legend.textContent(), /certain, 0.*nine of ten vertices lie within 1\.6 times this.*scan's unit/s);
+  await editor.idle();
+  await editor.keep('heat-confidence');
+  assert.deepEqual(await complaints(page), []);
+
+  // The middle of the patch, with and without the map.
+  const { x, y } = await editor.onCloth();
+  const clip = { x: x - 20, y: y - 20, width: 40, height: 40 };
+  const confidence = await page.screenshot({ clip });
+  await page.getByRole('radio', { name: 'Shaded' }).check();
+  await page.getByLabel('New cloth in its own colour').uncheck();
+  await editor.idle();
+  assert.ok((await editor.difference(confidence, await page.screenshot({ clip }))) > 0.9);
+
+  await page.getByRole('radio', { name: 'Confidence' }).check();
+  await editor.idle();
+  const shown = () =>
+    page.evaluate(() => {
+      const { viewer } = document.querySelector('darn-editor').shadowRoot.querySelector('darn-stage');
+      const [patch] = viewer.patches;
+      return { values: [...patch.heatValues('confidence')], positions: [...patch.shown.positions] };
+    });
+  const before = await shown();
+  const deviations = await editor.model((it) => it.patches[0].hole.patchDeviations);
+  assert.ok(deviations.length > 0);
+  assert.deepEqual(before.values, Array.from(Float32Array.from(deviations)));
+  const still = await editor.picture();
+  await editor.tool('g');
+  await editor.drag(await editor.onCloth(), { x: 40, y: -40 });
+  await editor.keep('heat-confidence-grab');
+  const after = await shown();
+  assert.notDeepEqual(after.positions, before.positions);
+  assert.deepEqual(after.values, before.values);
+  assert.ok((await editor.difference(still, await editor.picture())) > 0.002, 'the colours follow the cloth');
+});
+
 inEditor(
   'the dot of an anchor is dragged on the chart, the cloth follows, and arrow keys move it',
   async (editor, page) => {

@@ -16,6 +16,7 @@ import {
   Vector3,
 } from '../vendor.js';
 import { type VertexNumbers, vertexNumbers } from './curvature.js';
+import { patchDeviations } from './deviations.js';
 import { type Heat, type HeatScale, heatColors } from './heat_colors.js';
 import { vectors } from './scan_model.js';
 import { patchStretch } from './stretch.js';
@@ -120,7 +121,14 @@ export class PatchModel {
 
   /** The numbers of a heat map, of each patch vertex. */
   heatValues(heat: Heat): Float32Array {
-    return heat === 'stretch' ? patchStretch(this.patch) : this.numbers().curvature;
+    switch (heat) {
+      case 'stretch':
+        return patchStretch(this.patch);
+      case 'curvature':
+        return this.numbers().curvature;
+      case 'confidence':
+        return patchDeviations(this.patch);
+    }
   }
 
   /** Colours it by a heat map. */

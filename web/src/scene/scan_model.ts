@@ -31,7 +31,7 @@ export type Shading = 'textured' | 'shaded' | 'wireframe' | Heat;
 
 /** The heat map that a shading is; undefined for others. */
 export function heatOf(shading: Shading): Heat | undefined {
-  return shading === 'stretch' || shading === 'curvature' ? shading : undefined;
+  return shading === 'textured' || shading === 'shaded' || shading === 'wireframe' ? undefined : shading;
 }
 
 /** The colour of a surface without its texture. */

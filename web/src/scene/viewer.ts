@@ -24,7 +24,7 @@ import { linesOfLoops } from './boundary.js';
 import { Marks } from './marks.js';
 import { PatchModel, type Surface, TINT, blendedMaterial, readSurfaces } from './patch_model.js';
 import { Rims } from './rims.js';
-import { type Heat, type HeatScale, heatColors, scaleOf } from './heat_colors.js';
+import { type Heat, type HeatScale, heatColors, ownColors, scaleOf } from './heat_colors.js';
 import { ScanModel, type Shading, heatOf, plainMaterial } from './scan_model.js';
 import { stretchCells } from './stretch.js';
 
@@ -257,8 +257,9 @@ export class Viewer {
     if (this.scan !== scan || heatOf(this.look.shading) !== heat || this.patches !== patches) {
       return;
     }
-    this.heat = scaleOf(heat, [values, ...patches.map((patch) => patch.heatValues(heat))]);
-    scan.paint(heatColors(values, shade, this.heat));
+    const ofPatches = patches.map((patch) => patch.heatValues(heat));
+    this.heat = scaleOf(heat, values === undefined ? ofPatches : [values, ...ofPatches]);
+    scan.paint(values === undefined ? ownColors(shade) : heatColors(values, shade, this.heat));
     for (const patch of patches) {
       patch.paint(this.heat);
     }
@@ -267,7 +268,11 @@ export class Viewer {
     this.draw();
   }
 
-  private async heatOfScan(heat: Heat, scan: ScanModel): Promise<Float32Array> {
+  /** The numbers of the scan's vertices; undefined for a map of the new cloth alone. */
+  private async heatOfScan(heat: Heat, scan: ScanModel): Promise<Float32Array | undefined> {
+    if (heat === 'confidence') {
+      return undefined;
+    }
     if (heat === 'curvature') {
       return (await scan.numbers()).curvature;
     }

@@ -1,6 +1,6 @@
 /** What the colours of a heat map mean. */
 import { short } from '../model/loops.js';
-import { type Heat, type HeatScale, heatGradient, unknownColor } from '../scene/heat_colors.js';
+import { type Heat, type HeatScale, OWN_STYLE, UNKNOWN_STYLE, heatGradient } from '../scene/heat_colors.js';
 import { type TemplateResult, css, html, nothing, unsafeCSS } from '../vendor.js';
 
 export const legendStyles = css`
@@ -26,7 +26,10 @@ export const legendStyles = css`
     margin-top: 4px;
     border: 1px solid var(--line);
     border-radius: 3px;
-    background: ${unsafeCSS(heatGradient())};
+    background: ${unsafeCSS(heatGradient('curvature'))};
+  }
+  .bar.confidence {
+    background: ${unsafeCSS(heatGradient('confidence'))};
   }
   .ends {
     display: flex;
@@ -45,23 +48,35 @@ export const legendStyles = css`
     height: 12px;
     border-radius: 3px;
     vertical-align: -1px;
-    background: ${unsafeCSS(unknownColor())};
+    background: ${unsafeCSS(UNKNOWN_STYLE)};
+  }
+  .patch.own {
+    background: ${unsafeCSS(OWN_STYLE)};
   }
 `;
 
 interface Words {
   readonly title: string;
   readonly about: string;
+  /** What grey means. */
   readonly unknown: string;
-  /** The least, the middle and the largest value. */
-  ends(most: number): [string, string, string];
+  /** The colours from the least value to the largest, for a screen reader. */
+  readonly bar: string;
+  /** What a map of the new cloth alone says of the scan's own. */
+  readonly own?: string;
+  readonly unit?: string;
+  /** The least, perhaps a middle, and the largest value. */
+  ends(most: number): readonly string[];
 }
+
+const TWO_SIDED_BAR = 'From blue over white to orange';
 
 const WORDS: Readonly<Record<Heat, Words>> = {
   stretch: {
     title: 'Stretch',
     about: 'Lengths of the cloth, compared with the same cloth laid flat.',
-    unknown: 'not laid flat: away from the mended holes',
+    unknown: 'Grey: not laid flat: away from the mended holes.',
+    bar: TWO_SIDED_BAR,
     ends: (most) => {
       const percent = `${short(most * 100)} %`;
       const shorter = Number(((1 - 1 / (1 + most)) * 100).toPrecision(2));
@@ -71,29 +86,49 @@ const WORDS: Readonly<Record<Heat, Words>> = {
   curvature: {
     title: 'Curvature',
     about: 'Whether the cloth bends in two directions at once. Cloth that is only folded stays white.',
-    unknown: 'not known',
+    unknown: 'Grey: not known.',
+    bar: TWO_SIDED_BAR,
+    unit: "In one over the scan's unit squared.",
     ends: (most) => [`saddle, −${short(most)}`, 'flat or folded, 0', `dome, ${short(most)}`],
   },
+  confidence: {
+    title: 'Confidence',
+    about:
+      'How far new cloth may be off: nine of ten vertices lie within 1.6 times this of the cloth that was there. That is of the cloth before anchors and gestures.',
+    unknown: 'Dark grey: new cloth of which it is not known.',
+    bar: 'From light yellow over orange to dark brown',
+    own: "Light grey: the scan's own cloth.",
+    unit: "In the scan's unit.",
+    ends: (most) => ['certain, 0', `uncertain, ${short(most)}`],
+  },
 };
+
+const NOTHING_KNOWN =
+  'Nothing is known: no hole is mended yet, or none that is has a chart and was filled with weights that were calibrated.';
 
 /** The legend; without a scale the map is still computed. */
 export function heatLegend(heat: Heat | undefined, scale: HeatScale | undefined): TemplateResult | typeof nothing {
   if (heat === undefined) {
     return nothing;
   }
-  const { title, about, unknown, ends } = WORDS[heat];
+  const { title, about, unknown, bar, own, unit, ends } = WORDS[heat];
   if (scale === undefined) {
     return html`<div class="legend" role="status"><strong>${title}</strong> is computed …</div>`;
   }
-  const [least, middle, most] = ends(scale.most);
+  const isUnknown = Number.isNaN(scale.most);
   return html`
     <div class="legend" role="group" aria-label="Legend: ${title}">
       <strong>${title}</strong>
-      <div class="bar" role="img" aria-label="From blue over white to orange"></div>
-      <div class="ends"><span>${least}</span><span>${middle}</span><span>${most}</span></div>
-      <p>${about}</p>
-      <p><span class="patch"></span> Grey: ${unknown}.</p>
-      ${heat === 'curvature' ? html`<p class="quiet">In one over the scan's unit squared.</p>` : nothing}
+      ${
+        isUnknown
+          ? html`<p>${NOTHING_KNOWN}</p>`
+          : html`<div class="bar ${heat}" role="img" aria-label=${bar}></div>
+              <div class="ends">${ends(scale.most).map((end) => html`<span>${end}</span>`)}</div>
+              <p>${about}</p>`
+      }
+      <p><span class="patch"></span> ${unknown}</p>
+      ${own === undefined ? nothing : html`<p><span class="patch own"></span> ${own}</p>`}
+      ${unit === undefined || isUnknown ? nothing : html`<p class="quiet">${unit}</p>`}
     </div>
   `;
 }

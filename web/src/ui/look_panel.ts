@@ -9,6 +9,7 @@ const SHADINGS = [
   ['wireframe', 'Wireframe'],
   ['stretch', 'Stretch'],
   ['curvature', 'Curvature'],
+  ['confidence', 'Confidence'],
 ] as const;
 
 /** The event `darn-look` carries what has changed of the look in `detail`. */
