@@ -9,6 +9,7 @@ const { vertexNumbers } = await load('scene/curvature.ts');
 const { patchStretch, stretchAt, stretchCells } = await load('scene/stretch.ts');
 const { patchDeviations } = await load('scene/deviations.ts');
 const { heatColors, ownColors, scaleOf } = await load('scene/heat_colors.ts');
+const { holeInWords } = await load('model/report.ts');
 const { Middles, indexWithout } = await load('scene/cut_faces.ts');
 const { AnchorMap } = await load('model/anchor_map.ts');
 const { stretchBetween } = await load('scene/border_stretch.ts');
@@ -118,6 +119,18 @@ test('the less certain the darker, from 0 to the largest deviation; nothing know
   const flat = scaleOf('confidence', [new Float32Array(3)]);
   assert.equal(flat.most, 0);
   assert.deepEqual([...heatColors(new Float32Array(1), new Float32Array(1).fill(1), flat)], each[0]);
+});
+
+test('the report says the confidence in words: as the interval of half of the vertices, and by grades', () => {
+  const confidence = { median: 0.02, p90: 0.05, veryHigh: 0.123, high: 0.5, medium: 0.374, low: 0.003, veryLow: 0 };
+  const said = (hole) => holeInWords(hole).filter((line) => /confidence/.test(line));
+  assert.deepEqual(said({ id: 1, patch: { confidence } }), [
+    'Half of the new vertices have nine chances in ten to lie within 0.0329 of the cloth that was there; confidence is very high at 12 %, high at 50 %, medium at 37 % of the vertices.',
+  ]);
+  for (const made of [{ anchors: [{ distance: 0 }] }, { edits: [{ distance: 0 }] }]) {
+    assert.match(said({ id: 1, patch: { confidence }, ...made })[0], /^Before anchors and gestures, half of/);
+  }
+  assert.deepEqual(said({ id: 1, patch: {} }), []);
 });
 
 test('triangles are taken out by their middles, and no others', () => {

@@ -271,6 +271,7 @@ inEditor('confidence is shown as colours with a legend, which stay with their ve
   await editor.idle();
   await editor.keep('heat-confidence');
   assert.deepEqual(await complaints(page), []);
+  await page.getByText(/of the new vertices have nine chances in ten/).waitFor();
 
   // The middle of the patch, with and without the map.
   const { x, y } = await editor.onCloth();
@@ -301,6 +302,7 @@ inEditor('confidence is shown as colours with a legend, which stay with their ve
   assert.notDeepEqual(after.positions, before.positions);
   assert.deepEqual(after.values, before.values);
   assert.ok((await editor.difference(still, await editor.picture())) > 0.002, 'the colours follow the cloth');
+  await page.getByText(/Before anchors and gestures, half/).waitFor();
 });
 
 inEditor(

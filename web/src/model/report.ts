@@ -1,8 +1,11 @@
 /** The service's report in words. */
-import type { HoleReport, Report } from '../client.js';
+import type { Confidence, HoleReport, Report } from '../client.js';
 import { short } from './loops.js';
 
 const NO_CHART = 'The cloth around it cannot be laid flat: a fair surface without folds, which takes no gestures.';
+
+/** Nine of ten vertices lie within so many standard deviations of the cloth that was there. */
+const WITHIN_90 = 1.645;
 
 /** One sentence or two for each hole. */
 export function holeInWords(hole: HoleReport): string[] {
@@ -12,6 +15,7 @@ export function holeInWords(hole: HoleReport): string[] {
     `Hole ${hole.id}: ${faces} new triangles, area ${short(patch.area)}, on a rim of length ${short(hole.length)}.`,
     `${stretchInWords(patch.stretchMean, patch.stretchMax)} ${crossingsInWords(patch.selfIntersections ?? 0)}`,
     patch.method === 'fair' ? NO_CHART : shareInWords(patch.networkShare),
+    confidenceInWords(patch.confidence, (hole.anchors ?? []).length + (hole.edits ?? []).length),
   ];
   if (hole.cut !== undefined && (hole.cut.faces ?? 0) > 0) {
     const cut = (hole.cut.faces ?? 0).toLocaleString('en');
@@ -59,6 +63,27 @@ function shareInWords(share: number | undefined): string {
   return share <= 0.005
     ? 'A fair surface without folds, as the cloth around it has none.'
     : `${percent(share)} of the network's folds, for the rest a fair surface.`;
+}
+
+/** @param made - Anchors and gestures, which the confidence does not count. */
+function confidenceInWords(confidence: Confidence | undefined, made: number): string {
+  if (confidence?.median === undefined) {
+    return '';
+  }
+  const grades: [string, number | undefined][] = [
+    ['very high', confidence.veryHigh],
+    ['high', confidence.high],
+    ['medium', confidence.medium],
+    ['low', confidence.low],
+    ['very low', confidence.veryLow],
+  ];
+  const shares = grades
+    .map(([grade, share = 0]) => [grade, Math.round(100 * share)] as const)
+    .filter(([, share]) => share > 0)
+    .map(([grade, share]) => `${grade} at ${share} %`);
+  const before = made > 0 ? 'Before anchors and gestures, half' : 'Half';
+  const within = short(WITHIN_90 * confidence.median);
+  return `${before} of the new vertices have nine chances in ten to lie within ${within} of the cloth that was there; confidence is ${shares.join(', ')} of the vertices.`;
 }
 
 function percent(share: number): string {
