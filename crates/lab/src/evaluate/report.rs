@@ -9,6 +9,9 @@ use super::metrics::FillMetrics;
 use crate::scarffolds::masks::{MaskShape, SHAPES};
 use darn_geometry::grid::SIDE;
 
+/// Quantiles at which distributions are compared.
+const QUANTILES: usize = 1000;
+
 /// How the hole was filled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -159,8 +162,8 @@ impl EvaluationReport {
         let _ = writeln!(
             text,
             "{cases} samples, no noise; spacing of the truth: 1/64 = {:.6}\n\n\
-             | fill | | RMSE cells | normals deg | spacing mean | of 1/64 | spacing variance | area | abs. defect rad | cuts |\n\
-             |---|---|---|---|---|---|---|---|---|---|",
+             | fill | | RMSE cells | normals deg | spacing mean | of 1/64 | spacing variance | area | abs. defect rad | from the truth's | cuts |\n\
+             |---|---|---|---|---|---|---|---|---|---|---|",
             1.0 / SIDE as f64
         );
         for (stage, fill) in stages() {
@@ -169,7 +172,7 @@ impl EvaluationReport {
             let Some(m) = self.mean(wanted) else { continue };
             let _ = writeln!(
                 text,
-                "| {} | {} | {:.3} | {:.2} | {:.6} | {:.4} | {:.2e} | {:.4} | {:.4} | {:.2} |",
+                "| {} | {} | {:.3} | {:.2} | {:.6} | {:.4} | {:.2e} | {:.4} | {:.4} | {:.4} | {:.2} |",
                 fill.name(),
                 stage.name(),
                 m.rmse,
@@ -179,9 +182,22 @@ impl EvaluationReport {
                 m.spacing_variance,
                 m.area,
                 m.curvature,
+                self.defect_distance(fill, stage),
                 m.self_intersections
             );
         }
+    }
+
+    /// Wasserstein distance of a fill's angle defects from those of the truth as it is, radians: averages look alike where a fill is too smooth here
+    /// and too rough there.
+    fn defect_distance(&self, method: FillMethod, stage: EvaluationStage) -> f64 {
+        let pool = |method, stage| {
+            let mut each = self.defects.iter();
+            let found = each.find(|pool| pool.method == method && pool.stage == stage);
+            found.map_or(&[][..], |pool| &pool.defects)
+        };
+        let truth = pool(FillMethod::Truth, EvaluationStage::Filled);
+        wasserstein(pool(method, stage), truth)
     }
 
     fn by_hole(&self, text: &mut String) {
@@ -263,9 +279,40 @@ impl EvaluationReport {
     }
 }
 
+/// The distance of two distributions of numbers: how far one has to be moved on average to become the other (Wasserstein 1). 0 if one is empty.
+fn wasserstein(a: &[f64], b: &[f64]) -> f64 {
+    if a.is_empty() || b.is_empty() {
+        return 0.0;
+    }
+    let sorted = |numbers: &[f64]| {
+        let mut sorted = numbers.to_vec();
+        sorted.sort_unstable_by(f64::total_cmp);
+        sorted
+    };
+    let (a, b) = (sorted(a), sorted(b));
+    let quantile = |of: &[f64], n: usize| of[(n * of.len() + of.len() / 2) / QUANTILES];
+    let apart = |n: usize| (quantile(&a, n) - quantile(&b, n)).abs();
+    (0..QUANTILES).map(apart).sum::<f64>() / QUANTILES as f64
+}
+
 /// All methods at all stages, in the order of the tables.
 pub(super) fn stages() -> impl Iterator<Item = (EvaluationStage, FillMethod)> {
     EvaluationStage::ALL
         .into_iter()
         .flat_map(|stage| FillMethod::ALL.map(|fill| (stage, fill)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distributions_are_as_far_apart_as_one_is_moved() {
+        let ramp: Vec<f64> = (0..5000).map(f64::from).collect();
+        let moved: Vec<f64> = ramp.iter().rev().map(|x| x + 3.0).collect();
+        assert_eq!(wasserstein(&ramp, &ramp), 0.0);
+        assert!((wasserstein(&ramp, &moved) - 3.0).abs() < 1e-9);
+        assert!((wasserstein(&[0.0, 1.0], &[0.0, 0.0, 1.0, 1.0])).abs() < 1e-9);
+        assert_eq!(wasserstein(&[], &ramp), 0.0);
+    }
 }
