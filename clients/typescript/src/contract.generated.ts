@@ -415,7 +415,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The version, and the limits of a request */
+        /** The version and the build, the weights, and the limits of a request */
         get: operations["info"];
         put?: never;
         post?: never;
@@ -515,6 +515,8 @@ export interface components {
             acceptDoubtful?: boolean;
             /** @description Where the patches' colours come from: `synthesize` (images of their own, completed from the cloth around the hole), `continue` (the scan's texture coordinates and colours go on from the rim), `flat` (one colour, the mean of the cloth around) or `none` (grey). Left out: `continue` where that looks like the cloth around the hole, otherwise `synthesize`. */
             texture?: string;
+            /** @description Which of the plausible fills of each hole is applied: 0, the likeliest, to 7. Where one lies on one side of the likeliest (1, 3, 5), the next lies on the other (2, 4, 6); the larger the number, the rarer such a fill. Left out: 0. A hole that a smooth surface closes has one fill only. */
+            alternative?: number;
         };
         /** @description One hole, by exactly one of its fields. */
         HoleSelector: {
@@ -926,6 +928,8 @@ export interface components {
             method?: string;
             /** @description How far the new cloth may be from the cloth that was there; left out where that was never measured: without a chart, and for weights that were not calibrated. Of the cloth before anchors and gestures. */
             confidence?: components["schemas"]["Confidence"];
+            /** @description Which of the plausible fills it is: 0, the likeliest, to 7. */
+            alternative?: number;
         };
         /** @description How far the new vertices may be from the cloth that was there. Each has a standard deviation, in the scene's unit: nine of ten vertices lie within 1.645 deviations. The attribute `_CONFIDENCE` of the patch has them all. The grades say how wide that interval is against the hole's width. */
         Confidence: {
@@ -1255,6 +1259,19 @@ export interface components {
         Info: {
             /** @description darn's version */
             version: string;
+            /** @description What the program was built of and for */
+            build: {
+                /** @description The commit, where the build was told it */
+                commit?: string;
+                /** @description The processor's, such as x86_64 */
+                architecture: string;
+                /** @description The operating system, such as linux */
+                system: string;
+            };
+            /** @description The weights that are loaded, those of requests that name none first */
+            weights: components["schemas"]["Weights"][];
+            /** @description This process among those that serve together: the ids of its sessions begin with it */
+            instance: string;
             /** @description Whether the service keeps jobs: whether it was started with `--data` */
             jobs: boolean;
             limits: {
@@ -2971,7 +2988,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Version and limits */
+            /** @description Version, build, weights and limits */
             200: {
                 headers: {
                     [name: string]: unknown;
