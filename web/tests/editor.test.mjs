@@ -78,6 +78,61 @@ inEditor('the example is opened, mended, grabbed, undone, redone and saved', asy
   assert.equal(await editor.model((it) => it.constraintsText()), constraints);
 });
 
+inEditor('other fills are stepped through by keyboard, undone and saved', async (editor, page) => {
+  const fills = page.getByRole('group', { name: 'Fills' });
+  const [previous, next] = ['Previous fill', 'Next fill'].map((name) => editor.button(name));
+  // As they are drawn: on the example the fills lie closer together than a picture shows.
+  const positions = () =>
+    page.evaluate(() => {
+      const stage = document.querySelector('darn-editor').shadowRoot.querySelector('darn-stage');
+      return [...stage.viewer.patches[0].mesh.geometry.getAttribute('position').array];
+    });
+  await editor.openExample();
+  assert.equal(await next.isDisabled(), true);
+  await editor.mend();
+  const first = await positions();
+  await previous.focus();
+  await page.keyboard.press('Enter');
+  assert.equal(await editor.model((it) => it.alternative), 0, 'there is none before the first');
+
+  await next.focus();
+  await page.keyboard.press('Enter');
+  await page.keyboard.press('Enter');
+  await page.getByRole('status').getByText('Fill 3 of 8, beside the likeliest.').waitFor();
+  await editor.idle();
+  await fills.getByText('Fill 3 of 8').waitFor();
+  await page.locator('darn-report').getByText('Fill 3 of 8, beside the likeliest.').waitFor();
+  const third = await positions();
+  assert.equal(third.length, first.length);
+  assert.ok(
+    third.some((value, at) => value !== first[at]),
+    'the new cloth lies elsewhere',
+  );
+  await editor.keep('fill');
+  await page.evaluate(axe.source);
+  assert.deepEqual((await page.evaluate('axe.run()')).violations, []);
+  const constraints = await editor.model((it) => it.constraintsText());
+  assert.deepEqual(JSON.parse(constraints), { holes: [{ id: 1 }], alternative: 2 });
+  const file = await saved(editor, page);
+  assert.ok(file.bytes.equals(await stateless(service, constraints)), 'the bytes are those of POST /inpaint');
+
+  while ((await editor.model((it) => it.step.label)) !== 'Mend 1 hole') {
+    await editor.button('Undo').click();
+    await editor.idle();
+  }
+  await fills.getByText('Fill 1 of 8').waitFor();
+  assert.deepEqual(await positions(), first);
+  const undone = await saved(editor, page);
+  assert.ok(undone.bytes.equals(await stateless(service, '{"holes": [{"id": 1}]}')), 'undo is saved, too');
+
+  await page.getByText('Constraints as JSON', { exact: true }).click();
+  await page.getByRole('textbox', { name: 'Constraints as JSON' }).fill(constraints);
+  await editor.button('Load').click();
+  await editor.idle();
+  await fills.getByText('Fill 3 of 8').waitFor();
+  assert.deepEqual(await positions(), third);
+});
+
 inEditor('while dragging, one request is in flight', async (editor, page) => {
   await editor.openExample();
   await editor.mend();
@@ -166,17 +221,20 @@ inEditor('everything can be done by keyboard', async (editor, page) => {
   assert.match(await page.getByRole('alert').textContent(), /reach/);
 });
 
-inEditor('a session that has ended is opened again, and the edits are there', async (editor, page) => {
+inEditor('a session that has ended is opened again, and the fill and the edits are there', async (editor, page) => {
   await editor.openExample();
   const opened = page.waitForResponse((answer) => answer.url().endsWith('/sessions') && answer.status() === 201);
   await editor.mend();
   const path = (await opened).headers().location;
   await editor.tool('g');
   await editor.drag(await editor.onCloth(), { x: 30, y: -20 });
+  await editor.button('Next fill').click();
+  await editor.idle();
   assert.equal((await fetch(new URL(path, service.url), { method: 'DELETE' })).status, 204);
   await editor.drag(await editor.onCloth(0.01, 0.02), { x: -20, y: 10 });
   const constraints = await editor.model((it) => it.constraintsText());
-  assert.equal(JSON.parse(constraints).edits.length, 2);
+  const { edits, alternative } = JSON.parse(constraints);
+  assert.deepEqual([edits.length, alternative], [2, 1]);
   assert.ok((await saved(editor, page)).bytes.equals(await stateless(service, constraints)));
 });
 

@@ -8,6 +8,8 @@ const { Latest, Service, partsOf, problemOf } = await load('client.ts');
 const { History } = await load('model/history.ts');
 const { boundaryLines, linesOfLoops } = await load('scene/boundary.ts');
 const { readConstraints, carried, selectionOf, statelessMessageOf } = await load('model/constraints.ts');
+const { fillInWords, onlyFillInWords } = await load('model/fills.ts');
+const { Editor } = await load('model/editor.ts');
 const { locate, positionOf, normalOf } = await load('model/cloth.ts');
 const { scanOf } = await load('model/scan_files.ts');
 
@@ -131,6 +133,7 @@ test('constraints come back as they were written, and others are refused with wh
   const constraints = {
     anchors: [{ hole: 1, position: [0, 0, 0] }],
     edits: [{ hole: 2, grab: { uv: [0.5, 0.5], offset: [0, 1, 0] } }],
+    alternative: 3,
   };
   const made = [{ cut: { center: [0, 0, 0], radius: 1 } }, { border: { auto: true } }];
   const loops = [{ id: 1 }, { id: 2 }];
@@ -139,7 +142,12 @@ test('constraints come back as they were written, and others are refused with wh
   const text = JSON.stringify(statelessMessageOf(loops, choice, constraints));
   assert.deepEqual(readConstraints(text), { holes: [1, 2], made, acceptDoubtful: false, constraints });
   assert.deepEqual(readConstraints('{"holes": [{"border": "auto"}]}').made, [made[1]]);
-  for (const bad of ['', '[]', '{"cut": 1}', '{"holes": [{"near": [0, 0, 0]}]}', '{"edits": [1]}']) {
+  // The first fill is not named.
+  const first = statelessMessageOf(loops, choice, { ...constraints, alternative: 0 });
+  assert.equal('alternative' in first, false);
+  assert.equal(readConstraints(JSON.stringify(first)).constraints.alternative, 0);
+  const others = ['{"alternative": 8}', '{"alternative": -1}', '{"alternative": 0.5}', '{"alternative": "1"}'];
+  for (const bad of ['', '[]', '{"cut": 1}', '{"holes": [{"near": [0, 0, 0]}]}', '{"edits": [1]}', ...others]) {
     assert.throws(() => readConstraints(bad), bad);
   }
 });
@@ -150,10 +158,113 @@ test('constraints go with the hole that has the same rim, whatever its number', 
   const after = [hole(1, 0, 0, 0), hole(4, 1, 1, 1), hole(3, 9, 9, 9)];
   const anchors = [1, 2, 3].map((id) => ({ hole: id, position: [0, 0, id] }));
   const edits = [{ grab: { uv: [0, 0], offset: [0, 0, 0] } }];
-  assert.deepEqual(carried({ anchors, edits }, before, after), {
+  assert.deepEqual(carried({ anchors, edits, alternative: 2 }, before, after), {
     anchors: [anchors[0], { ...anchors[1], hole: 4 }],
     edits,
+    alternative: 2,
   });
+});
+
+test('a fill is told in words, and why it is none other where holes have one only', () => {
+  const report = (...alternatives) => ({ holes: alternatives.map((alternative) => ({ patch: { alternative } })) });
+  assert.equal(fillInWords(0, report(0)), 'Fill 1 of 8, the likeliest.');
+  assert.equal(fillInWords(2, report(2)), 'Fill 3 of 8, beside the likeliest.');
+  assert.match(fillInWords(2, report(0)), /^Fill 3 of 8\. .*this hole: it has one fill only/);
+  assert.match(onlyFillInWords(2, report(0, undefined)), /these holes: each has one fill only/);
+  for (const [alternative, ...reported] of [[0, 0], [2, 0, 2], [2]]) {
+    assert.equal(onlyFillInWords(alternative, report(...reported)), undefined);
+  }
+});
+
+/** A service of one hole whose mends are answered by the test, one after another. */
+function serviceOfFills() {
+  const asked = [];
+  const hole = { id: 1, patchFaces: [0, 1, 2], patchUvs: [0, 0, 1, 0, 0, 1] };
+  const service = {
+    info: async () => ({ limits: {} }),
+    holes: async () => ({ loops: [{ id: 1, kind: 'HOLE' }] }),
+    openSession: async () => ({ id: 's', holes: [hole] }),
+    positions: async () => new Float32Array(9),
+    patches: async () => new ArrayBuffer(0),
+    mend: (_, { alternative = 0 }, { signal }) =>
+      new Promise((resolve, reject) => {
+        signal.addEventListener('abort', () => reject(signal.reason));
+        const report = { holes: [{ id: 1, patch: { alternative } }] };
+        const answer = () => resolve({ positions: new Float32Array(9).fill(alternative), report });
+        asked.push({ alternative, answer, refuse: reject });
+      }),
+    close: () => {},
+  };
+  return { service, asked };
+}
+
+/** Until everything that needs no answer has happened. */
+const settled = () => new Promise((resolve) => setTimeout(resolve, 5));
+
+test('one fill is asked for at a time, the newest waits, and each that came is a step', async () => {
+  const { service, asked } = serviceOfFills();
+  const editor = new Editor(service);
+  await editor.open(new Blob(['scan']), 'scan.glb');
+  await editor.chooseFill(1);
+  assert.equal(editor.canChooseFill, false, 'nothing is mended');
+  const mended = editor.mend();
+  await settled();
+  assert.equal(editor.canChooseFill, false, 'a session is being opened');
+  asked[0].answer();
+  await mended;
+
+  const chosen = editor.chooseFill(1);
+  await settled();
+  for (const fill of [2, 3]) {
+    await editor.chooseFill(editor.alternative + 1);
+    assert.equal(editor.alternative, fill);
+  }
+  assert.deepEqual(
+    asked.map(({ alternative }) => alternative),
+    [0, 1],
+  );
+  asked[1].answer();
+  await settled();
+  assert.equal(editor.step.constraints.alternative, 1);
+  asked[2].answer();
+  await chosen;
+  assert.equal(editor.message, 'Fill 4 of 8, beside the likeliest.');
+  assert.deepEqual([...editor.patches[0].positions], Array(9).fill(3));
+  editor.undo();
+  assert.equal(editor.alternative, 1);
+  editor.undo();
+  assert.deepEqual([editor.alternative, editor.step.label], [0, 'Mend 1 hole']);
+  editor.redo();
+  assert.deepEqual([editor.alternative, editor.step.label], [1, 'Fill 2 of 8']);
+});
+
+test('a fill that is refused or stopped is none, and what waited for it is forgotten', async () => {
+  const { service, asked } = serviceOfFills();
+  const editor = new Editor(service);
+  await editor.open(new Blob(['scan']), 'scan.glb');
+  const mended = editor.mend();
+  await settled();
+  asked[0].answer();
+  await mended;
+  for (const end of [() => asked.at(-1).refuse(new Error('full')), () => editor.work.stop.abort()]) {
+    const chosen = editor.chooseFill(1);
+    await settled();
+    await editor.chooseFill(2);
+    end();
+    await chosen;
+    assert.deepEqual([editor.alternative, editor.step.label, editor.canChooseFill], [0, 'Mend 1 hole', true]);
+  }
+  // A gesture that ends meanwhile goes first.
+  const chosen = editor.chooseFill(1);
+  await settled();
+  editor.preview({ kind: 'grab', hole: 1, uv: [0.2, 0.2], offset: [0, 1, 0] });
+  const grabbed = editor.commit();
+  await chosen;
+  await settled();
+  assert.deepEqual([asked.at(-1).alternative, editor.alternative], [0, 0]);
+  asked.at(-1).answer();
+  await grabbed;
+  assert.equal(editor.step.label, 'Grab');
 });
 
 test('holes are chosen by leaving others out, other loops by name', () => {

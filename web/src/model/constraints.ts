@@ -1,11 +1,14 @@
 /** What a person asks of the new cloth, as the constraints of the contract. Values never change; edits make new ones. */
 import type { Anchor, Border, Constraints, Cut, Edit, Loop, SessionHole } from '../client.js';
+import { FILLS, isFill } from './fills.js';
 import { isHole } from './loops.js';
 
 /** Constraints without the choice of holes, which belongs to the session. */
 export interface ClothConstraints {
   readonly anchors: readonly Anchor[];
   readonly edits: readonly Edit[];
+  /** Which of the plausible fills of each hole is applied, 0 the likeliest. */
+  readonly alternative: number;
 }
 
 /** Cloth to cut out first, or a stretch of the cloth's own edge: an entry of `holes` that makes the hole that it fills. */
@@ -20,14 +23,14 @@ export interface Choice {
   readonly acceptDoubtful: boolean;
 }
 
-export const NO_CONSTRAINTS: ClothConstraints = { anchors: [], edits: [] };
+export const NO_CONSTRAINTS: ClothConstraints = { anchors: [], edits: [], alternative: 0 };
 
 /**
  * Constraints on other holes than those they were made on: each goes with its hole, which is known by its rim, as a cut may change numbers. Those of
  * holes that are gone, or have another rim, are left out; those that name no hole are kept.
  */
 export function carried(
-  { anchors, edits }: ClothConstraints,
+  { anchors, edits, alternative }: ClothConstraints,
   before: readonly SessionHole[],
   after: readonly SessionHole[],
 ): ClothConstraints {
@@ -38,7 +41,7 @@ export function carried(
     const hole = item.hole === undefined ? undefined : renamed.get(item.hole);
     return item.hole === undefined ? [item] : hole === undefined ? [] : [{ ...item, hole }];
   };
-  return { anchors: anchors.flatMap(moved), edits: edits.flatMap(moved) };
+  return { anchors: anchors.flatMap(moved), edits: edits.flatMap(moved), alternative };
 }
 
 /** The message for `POST /sessions/{id}/inpaint`. */
@@ -46,6 +49,7 @@ export function messageOf(constraints: ClothConstraints): Constraints {
   return {
     ...(constraints.anchors.length > 0 && { anchors: [...constraints.anchors] }),
     ...(constraints.edits.length > 0 && { edits: [...constraints.edits] }),
+    ...(constraints.alternative > 0 && { alternative: constraints.alternative }),
   };
 }
 
@@ -106,7 +110,14 @@ export function readConstraints(text: string): ConstraintsFile {
   if (typeof value !== 'object' || value === null || Array.isArray(value)) {
     throw new Error('The constraints must be a JSON object.');
   }
-  const { holes, acceptDoubtful = false, anchors = [], edits = [], ...others } = value as Record<string, unknown>;
+  const {
+    holes,
+    acceptDoubtful = false,
+    anchors = [],
+    edits = [],
+    alternative = 0,
+    ...others
+  } = value as Record<string, unknown>;
   const unknown = Object.keys(others);
   if (unknown.length > 0) {
     throw new Error(`The editor does not use: ${unknown.join(', ')}.`);
@@ -117,7 +128,10 @@ export function readConstraints(text: string): ConstraintsFile {
   if (typeof acceptDoubtful !== 'boolean') {
     throw new Error('`acceptDoubtful` must be true or false.');
   }
-  return { ...chosenHoles(holes), acceptDoubtful, constraints: { anchors, edits } };
+  if (!isFill(alternative)) {
+    throw new Error(`\`alternative\` must be a whole number from 0 to ${FILLS - 1}.`);
+  }
+  return { ...chosenHoles(holes), acceptDoubtful, constraints: { anchors, edits, alternative } };
 }
 
 function chosenHoles(holes: unknown): Pick<ConstraintsFile, 'holes' | 'made'> {

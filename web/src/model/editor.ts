@@ -25,8 +25,10 @@ import {
 } from './constraints.js';
 import { type AnchorDraft, type Draft, NAMES, isMaking, madeBy, previewed, withAnchor, withGesture } from './draft.js';
 import { type FoundAnchor, type OpenScan, START, type Step, type Tool, type Work } from './editor_state.js';
+import { fillName, isFill } from './fills.js';
 import { History } from './history.js';
 import { isHole } from './loops.js';
+import { stepInWords } from './report.js';
 import { type Patch, ScanSession } from './scan_session.js';
 
 /**
@@ -55,6 +57,8 @@ export class Editor extends EventTarget {
   /** The last result in words, for everybody and for screen readers. */
   message = '';
 
+  /** The fill that was asked for last, until it is a step. */
+  private wantedFill: number | undefined;
   private history = new History<Step>(START);
   private session: ScanSession | undefined;
   private readonly live = new Latest();
@@ -72,6 +76,16 @@ export class Editor extends EventTarget {
   /** The patches that take gestures and anchors: those with a chart. */
   get editable(): readonly Patch[] {
     return this.step.patches.filter(hasChart);
+  }
+
+  /** The plausible fill that is shown, or the one that is waited for: 0 is the likeliest. */
+  get alternative(): number {
+    return this.wantedFill ?? this.step.constraints.alternative;
+  }
+
+  /** Whether another fill can be chosen: something is mended, and nothing else is under way. */
+  get canChooseFill(): boolean {
+    return this.step.patches.length > 0 && (this.work === undefined || this.wantedFill !== undefined);
   }
 
   /** The patches to show: those of the draft while there is one. */
@@ -221,6 +235,27 @@ export class Editor extends EventTarget {
   dropDraft(): void {
     this.draft = undefined;
     this.draftPatches = undefined;
+    this.changed();
+  }
+
+  /** Shows another of the plausible fills of the mended holes. One request is in flight, and the newest choice waits. */
+  async chooseFill(alternative: number): Promise<void> {
+    if (!this.canChooseFill || !isFill(alternative)) {
+      return;
+    }
+    const isAsking = this.wantedFill !== undefined;
+    this.wantedFill = alternative;
+    this.changed();
+    if (isAsking) {
+      return;
+    }
+    let step: Step | undefined;
+    // Until the newest choice is shown, one was refused, or something else was begun meanwhile.
+    while (this.step !== step && this.work === undefined && this.alternative !== this.step.constraints.alternative) {
+      step = this.step;
+      await this.apply(fillName(this.alternative), step, { ...step.constraints, alternative: this.alternative });
+    }
+    this.wantedFill = undefined;
     this.changed();
   }
 
@@ -408,12 +443,7 @@ export class Editor extends EventTarget {
     const holes = patches.map((patch) => patch.hole.id ?? 0);
     const { made, acceptDoubtful } = choice;
     this.history.push({ label, holes, made, acceptDoubtful, constraints, patches, cutFaces, report });
-    this.message = this.messageOfStep(label, this.history.present);
-  }
-
-  private messageOfStep(label: string, step: Step): string {
-    const faces = step.patches.reduce((sum, patch) => sum + (patch.hole.patchFaces?.length ?? 0) / 3, 0);
-    return `${label}: ${step.patches.length} filled, ${faces.toLocaleString('en')} new triangles.`;
+    this.message = stepInWords(this.history.present);
   }
 
   private travel(move: () => void, word: string): void {

@@ -1,5 +1,7 @@
 /** The service's report in words. */
 import type { Confidence, HoleReport, Report } from '../client.js';
+import type { Step } from './editor_state.js';
+import { fillInWords, fillName } from './fills.js';
 import { short } from './loops.js';
 
 const NO_CHART = 'The cloth around it cannot be laid flat: a fair surface without folds, which takes no gestures.';
@@ -11,10 +13,12 @@ const WITHIN_90 = 1.645;
 export function holeInWords(hole: HoleReport): string[] {
   const patch = hole.patch ?? {};
   const faces = (patch.faces ?? 0).toLocaleString('en');
+  const alternative = patch.alternative ?? 0;
   const lines = [
     `Hole ${hole.id}: ${faces} new triangles, area ${short(patch.area)}, on a rim of length ${short(hole.length)}.`,
     `${stretchInWords(patch.stretchMean, patch.stretchMax)} ${crossingsInWords(patch.selfIntersections ?? 0)}`,
     patch.method === 'fair' ? NO_CHART : shareInWords(patch.networkShare),
+    alternative > 0 ? fillInWords(alternative) : '',
     confidenceInWords(patch.confidence, (hole.anchors ?? []).length + (hole.edits ?? []).length),
   ];
   if (hole.cut !== undefined && (hole.cut.faces ?? 0) > 0) {
@@ -40,6 +44,15 @@ export function reportInWords(report: Report): string {
   const skipped = report.skipped?.length ?? 0;
   const left = skipped === 1 ? '1 loop is' : `${skipped} loops are`;
   return `${count(filled, 'hole')} filled; ${left} left open.`;
+}
+
+/** What a step did, in a sentence or two. */
+export function stepInWords({ label, constraints, patches, report }: Step): string {
+  if (label === fillName(constraints.alternative)) {
+    return fillInWords(constraints.alternative, report);
+  }
+  const faces = patches.reduce((sum, patch) => sum + (patch.hole.patchFaces?.length ?? 0) / 3, 0);
+  return `${label}: ${patches.length} filled, ${faces.toLocaleString('en')} new triangles.`;
 }
 
 function stretchInWords(mean: number | undefined, most: number | undefined): string {

@@ -3,6 +3,7 @@ import type { BorderCandidate, Loop, Vec3 } from '../client.js';
 import type { MadeHole } from '../model/constraints.js';
 import { byKind, isFillable, isHole, short, styleOf } from '../model/loops.js';
 import { type TemplateResult, css, html, nothing, svg } from '../vendor.js';
+import './fill_stepper.js';
 import { Panel } from './panel.js';
 
 /** Reasons to leave a loop that are only this list's own choice. */
@@ -77,6 +78,7 @@ export class HolesPanel extends Panel {
         <button ?disabled=${holes.length === 0} @click=${() => this.editor.choose(new Set(holes))}>All</button>
         <button ?disabled=${chosen.size === 0} @click=${() => this.editor.choose(new Set())}>None</button>
       </div>
+      <darn-fill .editor=${this.editor}></darn-fill>
     `;
   }
 
