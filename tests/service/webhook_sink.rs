@@ -27,6 +27,8 @@ use crate::harness::until;
 #[derive(Debug, Clone, Copy)]
 pub enum Reply {
     Status(u16),
+    /// 503, and not to be asked again for so many seconds.
+    Busy(u64),
     /// To another path of the same receiver.
     Redirect,
     /// None.
@@ -191,6 +193,10 @@ async fn answer(
     };
     match reply.unwrap_or(Reply::Status(204)) {
         Reply::Status(status) => StatusCode::from_u16(status).unwrap().into_response(),
+        Reply::Busy(seconds) => {
+            let later = [(header::RETRY_AFTER, seconds.to_string())];
+            (StatusCode::SERVICE_UNAVAILABLE, later).into_response()
+        }
         Reply::Redirect => (StatusCode::FOUND, [(header::LOCATION, "/elsewhere")]).into_response(),
         Reply::Silence => {
             tokio::time::sleep(Duration::from_secs(3600)).await;

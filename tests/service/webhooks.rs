@@ -177,6 +177,41 @@ async fn a_receiver_that_fails_is_told_again_later() {
 }
 
 #[tokio::test]
+async fn a_receiver_that_asks_for_time_is_given_it() {
+    let folder = folder();
+    let service = service(&folder, &LOCAL).await;
+    let sink = Sink::start(&[Reply::Busy(1200)]).await;
+    let job = hand_over(&service, &sink.url("/hook"), "cloth").await;
+    let failed = until_told(&service, &job, |it| it["lastStatus"] == 503).await;
+    // Seconds of the day, of a time such as 2026-11-29T12:34:56Z.
+    let at = |what: &str| {
+        let time = failed[what].as_str().unwrap().split('T').nth(1).unwrap();
+        let parts = time[..8].split(':');
+        parts.fold(0, |sum, part| 60 * sum + part.parse::<i64>().unwrap())
+    };
+    let pause = (at("nextTryAt") - at("lastTryAt")).rem_euclid(24 * 3600);
+    // Without the header it would be five seconds.
+    assert!((1195..1210).contains(&pause), "{failed}");
+}
+
+#[tokio::test]
+async fn a_new_secret_signs_once_its_file_has_changed() {
+    let folder = folder();
+    let service = service(&folder, &LOCAL).await;
+    let sink = Sink::start(&[Reply::Status(200)]).await;
+    let new = b"another secret of the service";
+    std::fs::write(folder.path().join("secret"), text(new)).unwrap();
+    let url = sink.url("/hook");
+    until(|| async {
+        let before = sink.received().len();
+        hand_over(&service, &url, "cloth").await;
+        let received = sink.wait_for(before + 1).await;
+        received[before].is_signed_with(new)
+    })
+    .await;
+}
+
+#[tokio::test]
 async fn redirects_are_not_followed_and_nobody_is_waited_for() {
     let folder = folder();
     let settings = [&LOCAL[..], &["--webhook-timeout", "300ms"]].concat();
