@@ -144,6 +144,87 @@ inEditor('a cut is typed, refused where it cannot be, and changed', async (edito
   assert.deepEqual((await constraintsOf(editor)).holes, [{ id: 1 }, { cut: { loops: [1] } }]);
 });
 
+inEditor(
+  'damaged cloth is cut out under a polygon of clicks, mended, undone and loaded again',
+  async (editor, page) => {
+    await editor.openExample();
+    const before = await editor.picture();
+    await editor.tool('c');
+    await page.getByRole('radio', { name: 'Polygon' }).check();
+    assert.equal(await page.getByRole('button', { name: 'Cut out', exact: true }).getAttribute('aria-pressed'), 'true');
+    assert.equal(await editor.button('Cut out and mend').isDisabled(), true, 'there are no corners');
+    const clicks = [
+      [0.02, 0.15],
+      [0.06, 0.15],
+      [0.06, 0.2],
+      [0.02, 0.2],
+    ];
+    for (const [right, down] of clicks) {
+      const { x, y } = await editor.onCloth(right, down);
+      await page.mouse.click(x, y);
+    }
+    const draft = await editor.model((it) => it.draft);
+    assert.deepEqual([draft.kind, draft.corners.length], ['polygon', 4]);
+    await page
+      .getByRole('status')
+      .getByText(/4 corners/)
+      .waitFor();
+    await editor.idle();
+    assert.ok((await editor.difference(before, await editor.picture())) > 0.001, 'the corners are seen');
+    await editor.keep('cut-polygon');
+    assert.deepEqual(await complaints(page), []);
+
+    // Corners are taken back by key and by button, dragged, and typed.
+    const corners = () => editor.model((it) => it.draft.corners);
+    await page.keyboard.press('Backspace');
+    assert.deepEqual(await corners(), draft.corners.slice(0, 3));
+    await editor.button('Take the last corner back').click();
+    await editor.button('Take the last corner back').click();
+    assert.deepEqual(await corners(), draft.corners.slice(0, 1));
+    // What is typed stays when a click takes the focus from its field, and a key in a field is for the field.
+    const [x, y, z] = draft.corners[0];
+    const typed = [x, Number((y + 0.001).toPrecision(6)), z];
+    await page.getByLabel('Corner 1 y').fill(String(typed[1]));
+    await page.keyboard.press('Home');
+    await page.keyboard.press('Backspace');
+    for (const [right, down] of clicks.slice(1)) {
+      const { x, y } = await editor.onCloth(right, down);
+      await page.mouse.click(x, y);
+    }
+    await editor.drag(await editor.onCloth(...clicks[3]), { x: -12, y: 6 });
+    const dragged = await corners();
+    assert.deepEqual(dragged.slice(0, 3), [typed, ...draft.corners.slice(1, 3)]);
+    assert.notDeepEqual(dragged[3], draft.corners[3]);
+    const depth = page.getByLabel('Depth');
+    const width = Math.max(...dragged.flatMap((a) => dragged.map((b) => Math.hypot(...a.map((x, k) => x - b[k])))));
+    assert.ok(Math.abs(Number(await depth.inputValue()) - width / 10) < 1e-5 * width);
+    await depth.fill('0.02');
+    await page.keyboard.press('Tab');
+
+    await editor.button('Cut out and mend').click();
+    await editor.idle();
+    assert.equal(await page.getByRole('alert').count(), 0);
+    const cut = await constraintsOf(editor);
+    assert.deepEqual(cut.holes, [{ cut: { polygon: dragged, depth: 0.02 } }]);
+    await page.getByText(/triangles of the scan were cut out first/).waitFor();
+    await page.getByText('Polygon of 4 corners ✓ mended').waitFor();
+    await editor.keep('cut-polygon-mended');
+    const { bytes } = await saved(editor, page);
+    assert.ok(bytes.equals(await stateless(service, JSON.stringify(cut))), 'the bytes are those of POST /inpaint');
+
+    await editor.button('Undo').click();
+    await editor.idle();
+    assert.equal(await editor.model((it) => it.step.made.length + it.step.cutFaces.length), 0);
+    await page.evaluate(
+      (text) => document.querySelector('darn-editor').editor.loadConstraints(text),
+      JSON.stringify(cut),
+    );
+    await editor.idle();
+    assert.deepEqual(await constraintsOf(editor), cut);
+    assert.ok((await saved(editor, page)).bytes.equals(bytes));
+  },
+);
+
 inEditor('a bite at the border is shown, mended up to a new hem, and its hem is moved', async (editor, page) => {
   const scan = sheetWithBite();
   await drop(page, 'bite.glb', scan);

@@ -9,6 +9,8 @@ const { History } = await load('model/history.ts');
 const { boundaryLines, linesOfLoops } = await load('scene/boundary.ts');
 const { readConstraints, carried, selectionOf, statelessMessageOf } = await load('model/constraints.ts');
 const { fillInWords, onlyFillInWords } = await load('model/fills.ts');
+const { depthOf, firstMaking, isWhole, madeBy, withCorner, withTypedCorner, withoutLastCorner } =
+  await load('model/draft.ts');
 const { Editor } = await load('model/editor.ts');
 const { locate, positionOf, normalOf } = await load('model/cloth.ts');
 const { scanOf } = await load('model/scan_files.ts');
@@ -150,6 +152,36 @@ test('constraints come back as they were written, and others are refused with wh
   for (const bad of ['', '[]', '{"cut": 1}', '{"holes": [{"near": [0, 0, 0]}]}', '{"edits": [1]}', ...others]) {
     assert.throws(() => readConstraints(bad), bad);
   }
+});
+
+test('a polygon gets corners one by one, is deep as a tenth of its width unless that is said, and comes back from JSON', () => {
+  const loops = [
+    { id: 0, kind: 'OUTER_BOUNDARY', centroid: [9, 9, 9] },
+    { id: 1, kind: 'HOLE', centroid: [1, 2, 3] },
+  ];
+  let draft = firstMaking('polygon', { loops, candidates: [] });
+  assert.deepEqual([draft.corners, depthOf(draft)], [[], 0]);
+  // Where nothing was clicked, at the hole; then where the last one is.
+  draft = withTypedCorner(draft, loops);
+  assert.deepEqual(draft.corners, [[1, 2, 3]]);
+  draft = withCorner(withTypedCorner(draft, loops), 1, [1, 2, 7]);
+  assert.equal(isWhole(draft), false);
+  draft = withCorner(withTypedCorner(draft, loops), 2, [4, 2, 3]);
+  assert.equal(isWhole(draft), true);
+  const corners = [
+    [1, 2, 3],
+    [1, 2, 7],
+    [4, 2, 3],
+  ];
+  assert.deepEqual(madeBy(draft), { cut: { polygon: corners, depth: 0.5 } });
+  assert.equal(depthOf(withoutLastCorner(draft)), 0.4);
+  assert.deepEqual(withoutLastCorner(draft).corners, corners.slice(0, 2));
+  assert.deepEqual(withoutLastCorner(firstMaking('polygon', { loops, candidates: [] })).corners, []);
+  const entry = madeBy({ ...draft, depth: 2 });
+  assert.equal(entry.cut.depth, 2);
+  const choice = { holes: [1], made: [entry], acceptDoubtful: false };
+  const message = statelessMessageOf(loops, choice, { anchors: [], edits: [], alternative: 0 });
+  assert.deepEqual(readConstraints(JSON.stringify(message)).made, [entry]);
 });
 
 test('constraints go with the hole that has the same rim, whatever its number', () => {

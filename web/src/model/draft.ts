@@ -53,6 +53,14 @@ export interface CutDraft {
   readonly radius: number;
 }
 
+/** Corners on the scan's cloth: what lies under their polygon is cut out, and mended. */
+export interface PolygonDraft {
+  readonly kind: 'polygon';
+  readonly corners: readonly Vec3[];
+  /** How far it reaches to either side of its mean plane; otherwise as `depthOf` says. */
+  readonly depth?: number;
+}
+
 /** A stretch of the cloth's own edge to mend up to a new hem. */
 export interface BorderDraft {
   readonly kind: 'border';
@@ -66,14 +74,19 @@ export interface BorderDraft {
 export type ClothDraft = GrabDraft | TwistDraft | PinchDraft | AnchorDraft;
 export type GestureDraft = Exclude<ClothDraft, AnchorDraft>;
 /** What makes a hole that is mended. */
-export type MakingDraft = CutDraft | BorderDraft;
+export type MakingDraft = CutDraft | PolygonDraft | BorderDraft;
 export type Draft = ClothDraft | MakingDraft;
 export type ClothKind = ClothDraft['kind'];
 export type DraftKind = Draft['kind'];
 
 /** Whether a draft makes a hole, and does not change new cloth. */
 export function isMaking(draft: Draft): draft is MakingDraft {
-  return draft.kind === 'cut' || draft.kind === 'border';
+  return draft.kind === 'cut' || draft.kind === 'polygon' || draft.kind === 'border';
+}
+
+/** Whether a draft has all that it needs to become a step: a polygon needs three corners. */
+export function isWhole(draft: Draft): boolean {
+  return draft.kind !== 'polygon' || draft.corners.length >= 3;
 }
 
 /** What a step is called that was made of a draft. */
@@ -83,6 +96,7 @@ export const NAMES: Readonly<Record<DraftKind, string>> = {
   pinch: 'Pinch',
   anchor: 'Anchor',
   cut: 'Cut out',
+  polygon: 'Cut out',
   border: 'Border',
 };
 
@@ -109,20 +123,50 @@ export interface MakingStart {
   readonly candidates: readonly BorderCandidate[];
 }
 
-/** A ball around the edge of the largest hole, or the first bite or rip that was found. */
+/** A ball around the edge of the largest hole, a polygon without corners, or the first bite or rip that was found. */
 export function firstMaking(kind: MakingDraft['kind'], { loops, candidates }: MakingStart): MakingDraft {
-  const [first] = byKind(loops)[0]?.[1] ?? [];
+  const first = firstLoop(loops);
   const centroid = pointOf(first?.centroid);
   switch (kind) {
     case 'cut': {
       const radius = (first?.diameter ?? 1) * (first?.kind === 'HOLE' ? 0.55 : 0.05);
       return { kind, center: centroid, radius };
     }
+    case 'polygon':
+      return { kind, corners: [] };
     case 'border': {
       const { from, to } = candidates[0]?.border ?? {};
       return { kind, from: from ? pointOf(from) : centroid, to: to ? pointOf(to) : centroid, along: [] };
     }
   }
+}
+
+/** The largest hole, or the largest other loop of a scan without any. */
+function firstLoop(loops: readonly Loop[]): Loop | undefined {
+  return byKind(loops)[0]?.[1][0];
+}
+
+/** A polygon with one more corner for who types it: where its last one is, or at the largest hole. */
+export function withTypedCorner(draft: PolygonDraft, loops: readonly Loop[]): PolygonDraft {
+  const { corners } = draft;
+  return { ...draft, corners: [...corners, corners.at(-1) ?? pointOf(firstLoop(loops)?.centroid)] };
+}
+
+/** A polygon with one of its corners elsewhere. */
+export function withCorner(draft: PolygonDraft, corner: number, point: Vec3): PolygonDraft {
+  return { ...draft, corners: draft.corners.map((it, at) => (at === corner ? point : it)) };
+}
+
+/** A polygon without its last corner. */
+export function withoutLastCorner(draft: PolygonDraft): PolygonDraft {
+  return { ...draft, corners: draft.corners.slice(0, -1) };
+}
+
+/** How deep a polygon cuts, in the scene's unit: where nobody has said it, a tenth of the largest distance between two of its corners. */
+export function depthOf({ corners, depth }: PolygonDraft): number {
+  const farthest = (a: Vec3): number =>
+    Math.max(...corners.map((b) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2])));
+  return depth ?? Math.max(0, ...corners.map(farthest)) / 10;
 }
 
 function pointOf([x = 0, y = 0, z = 0]: readonly number[] = []): Vec3 {
@@ -145,6 +189,8 @@ export function madeBy(draft: MakingDraft): MadeHole {
   switch (draft.kind) {
     case 'cut':
       return { cut: { center: [...draft.center], radius: draft.radius } };
+    case 'polygon':
+      return { cut: { polygon: draft.corners.map((corner) => [...corner]), depth: depthOf(draft) } };
     case 'border': {
       const along = draft.along.map((point) => [...point]);
       return { border: { from: [...draft.from], to: [...draft.to], ...(along.length > 0 && { along }) } };

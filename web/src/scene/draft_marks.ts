@@ -50,6 +50,10 @@ function makingMarks(draft: MakingDraft, { stretch }: Waiting): Marked {
       const center = new Vector3(...draft.center);
       return { handles: [center], ball: { center, radius: draft.radius } };
     }
+    case 'polygon': {
+      const corners = draft.corners.map((corner) => new Vector3(...corner));
+      return { handles: corners, stretch: corners.length < 3 ? corners : [...corners, ...corners.slice(0, 1)] };
+    }
     case 'border': {
       const [from, to] = [new Vector3(...draft.from), new Vector3(...draft.to)];
       const along = draft.along.map((point) => new Vector3(...point));

@@ -1,13 +1,23 @@
 /** From a pointer on the picture to a gesture on the cloth. */
 import type { Uv, Vec3 } from '../client.js';
 import { type ClothPoint, nearestPatch, normalOf, positionOf } from '../model/cloth.js';
-import { type CutDraft, type Draft, firstMaking, handlesOf, withHandle } from '../model/draft.js';
+import {
+  type CutDraft,
+  type Draft,
+  type PolygonDraft,
+  firstMaking,
+  handlesOf,
+  withCorner,
+  withHandle,
+} from '../model/draft.js';
 import type { Editor } from '../model/editor.js';
 import { Vector3 } from '../vendor.js';
 import type { Hit, Viewer } from './viewer.js';
 
 /** A pointer that moved less, in CSS pixels, has clicked. */
 const CLICK = 4;
+/** How near to a handle or a corner a pointer holds it, in CSS pixels. */
+const REACH = 16;
 /** Radians that a twist turns for each CSS pixel. */
 const TURN = Math.PI / 200;
 /** How much a notch of the wheel changes a twist's radius, and its bounds on the chart. */
@@ -30,7 +40,7 @@ interface Hold {
   readonly hit: Hit;
   /** The cloth under it, where the tool needs cloth. */
   readonly cloth: HeldCloth | undefined;
-  /** Which handle of a stretch of border it holds. */
+  /** Which handle of a stretch of border, or corner of a polygon, it holds. */
   readonly part?: number | undefined;
   moved: boolean;
 }
@@ -105,9 +115,13 @@ export class Gestures {
       this.borderDown(event);
       return;
     }
+    const { draft } = this.editor;
+    if (draft?.kind === 'polygon' && this.takeHandle(event, draft.corners)) {
+      return;
+    }
     const hit = this.viewer.pick(event.clientX, event.clientY);
     const cloth = this.held(hit?.cloth);
-    if (tool === 'cut') {
+    if (tool === 'cut' || tool === 'polygon') {
       this.cutDown(event, hit);
       return;
     }
@@ -124,7 +138,18 @@ export class Gestures {
     this.hold = { pointer: event.pointerId, x: event.clientX, y: event.clientY, hit, cloth, part, moved: false };
   }
 
-  /** The middle of a cut is where the pointer goes down on the scan; how far it is dragged is the radius. */
+  /** Takes the nearest of some points that a draft has; false where none is near to the pointer. */
+  private takeHandle(event: PointerEvent, points: readonly Vec3[]): boolean {
+    const handles = points.map((point) => new Vector3(...point));
+    const held = this.viewer.nearestOf(handles, { x: event.clientX, y: event.clientY }, REACH);
+    if (held === undefined) {
+      return false;
+    }
+    this.take(event, { hit: { position: held, ...NOT_CLOTH }, cloth: undefined, part: handles.indexOf(held) });
+    return true;
+  }
+
+  /** The middle of a ball is where the pointer goes down on the scan; how far it is dragged is the radius. */
   private cutDown(event: PointerEvent, hit: Hit | undefined): void {
     if (hit === undefined) {
       return;
@@ -134,9 +159,26 @@ export class Gestures {
       this.editor.say('Only cloth of the scan itself can be cut out.');
       return;
     }
+    if (this.editor.tool === 'polygon') {
+      this.cornerDown(event, hit);
+      return;
+    }
     this.take(event, { hit, cloth: undefined });
     const { radius } = this.cutDraft();
     this.editor.preview({ kind: 'cut', center: hit.position.toArray(), radius });
+  }
+
+  /** Gives a polygon a corner where the pointer goes down, and holds it. */
+  private cornerDown(event: PointerEvent, hit: Hit): void {
+    this.take(event, { hit, cloth: undefined, part: this.polygonDraft().corners.length });
+    // Read only now: the picture has taken the focus from a field, whose number may have changed the draft.
+    const draft = this.polygonDraft();
+    this.editor.preview({ ...draft, corners: [...draft.corners, hit.position.toArray()] });
+  }
+
+  private polygonDraft(): PolygonDraft {
+    const { draft } = this.editor;
+    return draft?.kind === 'polygon' ? draft : { kind: 'polygon', corners: [] };
   }
 
   private cutDraft(): CutDraft {
@@ -147,17 +189,12 @@ export class Gestures {
 
   /** Takes a handle of the stretch, or begins and ends one at the cloth's edge. */
   private borderDown(event: PointerEvent): void {
-    const at = { x: event.clientX, y: event.clientY };
     const { draft } = this.editor;
     if (draft?.kind === 'border') {
-      const handles = handlesOf(draft).map((handle) => new Vector3(...handle));
-      const held = this.viewer.nearestOf(handles, at, 16);
-      if (held !== undefined) {
-        this.take(event, { hit: { position: held, ...NOT_CLOTH }, cloth: undefined, part: handles.indexOf(held) });
-      }
+      this.takeHandle(event, handlesOf(draft));
       return;
     }
-    const end = this.viewer.nearestOfBorder(at.x, at.y);
+    const end = this.viewer.nearestOfBorder(event.clientX, event.clientY);
     if (end === undefined) {
       return;
     }
@@ -193,6 +230,14 @@ export class Gestures {
     return target && withHandle(draft, part, target.toArray());
   }
 
+  /** A corner of a polygon is dragged along the scan's cloth. */
+  private movedCorner({ part = 0 }: Hold, { clientX, clientY }: PointerEvent): Draft | undefined {
+    const { draft } = this.editor;
+    const hit = this.viewer.pick(clientX, clientY);
+    const isOnScan = hit !== undefined && !hit.onPatch;
+    return draft?.kind === 'polygon' && isOnScan ? withCorner(draft, part, hit.position.toArray()) : undefined;
+  }
+
   private move(event: PointerEvent): void {
     const { hold } = this;
     if (hold === undefined || event.pointerId !== hold.pointer) {
@@ -220,6 +265,8 @@ export class Gestures {
       this.bordered(hold);
     } else if (tool === 'cut') {
       this.editor.say('Cut out: change the ball, or cut it out and mend.');
+    } else if (tool === 'polygon') {
+      this.editor.say(cornersInWords(this.editor.draft));
     } else if (tool === 'anchor' && !hold.moved) {
       this.editor.preview(this.anchorAt(hold, hold.hit.position));
       void this.editor.commit();
@@ -245,6 +292,8 @@ export class Gestures {
         const radius = edge?.distanceTo(hold.hit.position) ?? 0;
         return radius > 0 ? { kind: 'cut', center: hold.hit.position.toArray(), radius } : undefined;
       }
+      case 'polygon':
+        return this.movedCorner(hold, event);
       case 'border':
         return this.movedHandle(hold, event);
       default:
@@ -342,4 +391,11 @@ export class Gestures {
       }
     );
   }
+}
+
+/** How many corners a polygon has, and what can be done next. */
+function cornersInWords(draft: Draft | undefined): string {
+  const count = draft?.kind === 'polygon' ? draft.corners.length : 0;
+  const next = count < 3 ? 'click the next one' : 'click another, or cut it out and mend';
+  return `Cut out: ${count} ${count === 1 ? 'corner' : 'corners'}; ${next}.`;
 }

@@ -1,4 +1,4 @@
-/** Marks of a gesture: the handle under the pointer, the tether to the cloth, the ring of a twist, the ball of a cut, the stretch of a border. */
+/** Marks of a gesture: the handle under the pointer, the tether to the cloth, the ring of a twist, the ball or polygon of a cut, the stretch of a border. */
 import {
   BufferAttribute,
   BufferGeometry,

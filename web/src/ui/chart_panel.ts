@@ -289,6 +289,7 @@ function placesOf(draft: Draft): readonly Uv[] {
       return draft.uvs;
     case 'anchor':
     case 'cut':
+    case 'polygon':
     case 'border':
       return [];
   }

@@ -10,6 +10,7 @@
  * It emits `opened`, `mended`, `edited` and `saved`, which bubble out of shadow trees. The detail of `mended` and `edited` has the report
  * and the constraints, that of `saved` the file; a listener that prevents the default of `saved` keeps the page from downloading it.
  */
+import { withoutLastCorner } from '../model/draft.js';
 import { Editor } from '../model/editor.js';
 import { scanOf } from '../model/scan_files.js';
 import { Service } from '../client.js';
@@ -401,6 +402,8 @@ export class EditorElement extends LitElement {
     const usable = this.editor.scan !== undefined && (this.editor.editable.length > 0 || !needsCloth(tool ?? 'look'));
     if (tool !== undefined && usable) {
       this.editor.setTool(tool);
+    } else if (key === 'backspace' && this.editor.draft?.kind === 'polygon') {
+      this.editor.preview(withoutLastCorner(this.editor.draft));
     } else if (key === 'f') {
       this.stage?.viewer?.frame();
     } else if (key === 'b') {

@@ -224,7 +224,9 @@ function nameOf(entry: MadeHole): string {
   if (radius !== undefined) {
     return `Ball of radius ${short(radius)}`;
   }
-  return polygon !== undefined ? 'Polygon' : `Edge of ${(loops ?? []).map((loop) => `hole ${loop}`).join(', ')}`;
+  return polygon !== undefined
+    ? `Polygon of ${polygon.length} corners`
+    : `Edge of ${(loops ?? []).map((loop) => `hole ${loop}`).join(', ')}`;
 }
 
 /** How sure the service is about a kind, and why, where it had to decide between a hole and an opening. */

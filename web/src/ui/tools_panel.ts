@@ -9,14 +9,21 @@ import {
   type Draft,
   type DraftKind,
   type GrabDraft,
+  type MakingDraft,
   type PinchDraft,
+  type PolygonDraft,
   NAMES,
   type TwistDraft,
+  depthOf,
   firstDraft,
   firstMaking,
   handlesOf,
   isMaking,
+  isWhole,
+  withCorner,
   withHandle,
+  withTypedCorner,
+  withoutLastCorner,
 } from '../model/draft.js';
 import type { Tool } from '../model/editor_state.js';
 import { isHole } from '../model/loops.js';
@@ -69,9 +76,19 @@ export const TOOLS: readonly { tool: Tool; name: string; key: string; help: stri
   },
 ];
 
+/** A polygon is a shape of the tool that cuts out. */
+const POLYGON_HELP =
+  'For damaged cloth of any outline: click its corners one after another. A corner can be dragged, and Backspace takes the last one back. What lies under the polygon is cut out, and new cloth is put in.';
+
+/** The shapes that are cut out, each with the tool that it is. */
+const SHAPES: readonly (readonly [Tool, string])[] = [
+  ['cut', 'Ball'],
+  ['polygon', 'Polygon'],
+];
+
 /** Whether a tool works on new cloth, and so needs some. */
 export function needsCloth(tool: Tool): boolean {
-  return !['look', 'cut', 'border'].includes(tool);
+  return !['look', 'cut', 'polygon', 'border'].includes(tool);
 }
 
 /** What the button of a draft says. */
@@ -81,6 +98,7 @@ const COMMIT: Readonly<Record<DraftKind, string>> = {
   pinch: 'Apply',
   anchor: 'Find its place',
   cut: 'Cut out and mend',
+  polygon: 'Cut out and mend',
   border: 'Mend up to the new hem',
 };
 
@@ -110,6 +128,13 @@ export class ToolsPanel extends Panel {
       .wide {
         grid-column: 1 / -1;
       }
+      fieldset {
+        display: flex;
+        gap: 12px;
+        margin: 0;
+        padding: 0;
+        border: 0;
+      }
       .check {
         display: flex;
         align-items: center;
@@ -120,14 +145,15 @@ export class ToolsPanel extends Panel {
 
   protected override render(): TemplateResult {
     const { tool, step, editable } = this.editor;
-    const help = TOOLS.find((it) => it.tool === tool)?.help ?? '';
+    const shown = tool === 'polygon' ? 'cut' : tool;
+    const help = tool === 'polygon' ? POLYGON_HELP : (TOOLS.find((it) => it.tool === tool)?.help ?? '');
     return html`
       <h2>Tools</h2>
       <div class="row tools" role="group" aria-label="Tools">
         ${TOOLS.map(
           (it) => html`
             <button
-              aria-pressed=${it.tool === tool}
+              aria-pressed=${it.tool === shown}
               aria-keyshortcuts=${it.key}
               title="${it.name} (${it.key})"
               ?disabled=${editable.length === 0 && needsCloth(it.tool)}
@@ -151,7 +177,7 @@ export class ToolsPanel extends Panel {
     if (draft?.kind === kind) {
       return draft;
     }
-    if (kind === 'cut' || kind === 'border') {
+    if (kind === 'cut' || kind === 'polygon' || kind === 'border') {
       return scan && firstMaking(kind, scan);
     }
     return patch && firstDraft(kind, patch);
@@ -165,9 +191,9 @@ export class ToolsPanel extends Panel {
     const busy = work !== undefined;
     return html`
       <form @submit=${(event: Event) => this.apply(event, draft)}>
-        ${isMaking(draft) ? nothing : this.holeField(draft)} ${this.fields(draft)}
+        ${isMaking(draft) ? this.shapes(draft) : this.holeField(draft)} ${this.fields(draft)}
         <div class="row wide">
-          <button class="main" ?disabled=${busy}>${commitWord(draft)}</button>
+          <button class="main" ?disabled=${busy || !isWhole(draft)}>${commitWord(draft)}</button>
           <button type="button" ?disabled=${this.editor.draft === undefined} @click=${() => this.editor.dropDraft()}>
             Cancel
           </button>
@@ -223,6 +249,8 @@ export class ToolsPanel extends Panel {
         return this.anchorFields(draft);
       case 'cut':
         return this.cutFields(draft);
+      case 'polygon':
+        return this.polygonFields(draft);
       case 'border':
         return this.borderFields(draft);
     }
@@ -289,6 +317,48 @@ export class ToolsPanel extends Panel {
     return html`
       ${this.vectorFields('Centre', draft.center, (center) => ({ ...draft, center }))}
       ${this.number('Radius', draft.radius, (radius) => ({ ...draft, radius }))} ${this.cutEdges()}
+    `;
+  }
+
+  private polygonFields(draft: PolygonDraft): TemplateResult {
+    const { corners } = draft;
+    const { scan } = this.editor;
+    const add = (): void => this.preview(withTypedCorner(draft, scan?.loops ?? []));
+    const remove = (): void => this.preview(withoutLastCorner(draft));
+    return html`
+      ${corners.map((corner, at) =>
+        this.vectorFields(`Corner ${at + 1}`, corner, (moved) => withCorner(draft, at, moved)),
+      )}
+      <div class="row wide">
+        <button type="button" @click=${add}>Add a corner</button>
+        <button type="button" ?disabled=${corners.length === 0} @click=${remove}>Take the last corner back</button>
+      </div>
+      ${corners.length < 2 ? nothing : this.number('Depth', depthOf(draft), (depth) => ({ ...draft, depth }))}
+      ${this.cutEdges()}
+    `;
+  }
+
+  /** Whether a ball or a polygon is cut out. */
+  private shapes({ kind }: MakingDraft): TemplateResult | typeof nothing {
+    if (kind === 'border') {
+      return nothing;
+    }
+    return html`
+      <fieldset class="wide">
+        <legend class="quiet small">Shape</legend>
+        ${SHAPES.map(
+          ([tool, name]) => html`
+            <label class="check">
+              <input
+                type="radio"
+                name="shape"
+                .checked=${tool === kind}
+                @change=${() => this.editor.setTool(tool)}
+              />${name}
+            </label>
+          `,
+        )}
+      </fieldset>
     `;
   }
 
