@@ -81,3 +81,21 @@ export function sheetWithThreeHoles() {
 export function sheetWithBite() {
   return sheetGlb(40, (i, j) => (i - 19.5) ** 2 / 16 + j ** 2 / 36 < 1);
 }
+
+/** A sheet with one hole whose vertices have colours, as a glTF. */
+export function sheetInColours() {
+  const glb = sheetGlb(30, (i, j) => Math.hypot(i - 14.5, j - 14.5) < 4.3);
+  const end = 20 + glb.readUInt32LE(12);
+  const gltf = JSON.parse(glb.subarray(20, end));
+  const [{ count }] = gltf.accessors;
+  const colours = Float32Array.from({ length: 3 * count }, (_, at) => at / (3 * count));
+  const binary = glb.subarray(end + 8);
+  const bytes = Buffer.concat([binary, Buffer.from(colours.buffer)]);
+  gltf.bufferViews.push({ buffer: 0, byteOffset: binary.length, byteLength: colours.byteLength });
+  gltf.accessors.push({ bufferView: 2, componentType: 5126, count, type: 'VEC3' });
+  gltf.meshes[0].primitives[0].attributes.COLOR_0 = 2;
+  gltf.buffers = [
+    { byteLength: bytes.length, uri: `data:application/octet-stream;base64,${bytes.toString('base64')}` },
+  ];
+  return Buffer.from(JSON.stringify(gltf));
+}

@@ -6,6 +6,7 @@ import { join } from 'node:path';
 import { repository } from './browser.mjs';
 
 export const EXAMPLE = readFileSync(join(repository, 'examples/scarf_hole.glb'));
+export const TEXTURED = readFileSync(join(repository, 'tests/textured.glb'));
 
 /** What one `POST /inpaint` of the same constraints answers. */
 export async function stateless(service, constraints, scan = EXAMPLE) {

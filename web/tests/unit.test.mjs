@@ -136,6 +136,7 @@ test('constraints come back as they were written, and others are refused with wh
     anchors: [{ hole: 1, position: [0, 0, 0] }],
     edits: [{ hole: 2, grab: { uv: [0.5, 0.5], offset: [0, 1, 0] } }],
     alternative: 3,
+    texture: 'flat',
   };
   const made = [{ cut: { center: [0, 0, 0], radius: 1 } }, { border: { auto: true } }];
   const loops = [{ id: 1 }, { id: 2 }];
@@ -144,11 +145,13 @@ test('constraints come back as they were written, and others are refused with wh
   const text = JSON.stringify(statelessMessageOf(loops, choice, constraints));
   assert.deepEqual(readConstraints(text), { holes: [1, 2], made, acceptDoubtful: false, constraints });
   assert.deepEqual(readConstraints('{"holes": [{"border": "auto"}]}').made, [made[1]]);
-  // The first fill is not named.
-  const first = statelessMessageOf(loops, choice, { ...constraints, alternative: 0 });
-  assert.equal('alternative' in first, false);
-  assert.equal(readConstraints(JSON.stringify(first)).constraints.alternative, 0);
+  // The first fill and the service's own decision are not named.
+  const first = statelessMessageOf(loops, choice, { ...constraints, alternative: 0, texture: undefined });
+  assert.equal('alternative' in first || 'texture' in first, false);
+  const { alternative, texture } = readConstraints(JSON.stringify(first)).constraints;
+  assert.deepEqual([alternative, texture], [0, undefined]);
   const others = ['{"alternative": 8}', '{"alternative": -1}', '{"alternative": 0.5}', '{"alternative": "1"}'];
+  others.push('{"texture": "plaid"}', '{"texture": null}');
   for (const bad of ['', '[]', '{"cut": 1}', '{"holes": [{"near": [0, 0, 0]}]}', '{"edits": [1]}', ...others]) {
     assert.throws(() => readConstraints(bad), bad);
   }
@@ -190,10 +193,11 @@ test('constraints go with the hole that has the same rim, whatever its number', 
   const after = [hole(1, 0, 0, 0), hole(4, 1, 1, 1), hole(3, 9, 9, 9)];
   const anchors = [1, 2, 3].map((id) => ({ hole: id, position: [0, 0, id] }));
   const edits = [{ grab: { uv: [0, 0], offset: [0, 0, 0] } }];
-  assert.deepEqual(carried({ anchors, edits, alternative: 2 }, before, after), {
+  assert.deepEqual(carried({ anchors, edits, alternative: 2, texture: 'none' }, before, after), {
     anchors: [anchors[0], { ...anchors[1], hole: 4 }],
     edits,
     alternative: 2,
+    texture: 'none',
   });
 });
 
@@ -238,10 +242,10 @@ test('one fill is asked for at a time, the newest waits, and each that came is a
   const editor = new Editor(service);
   await editor.open(new Blob(['scan']), 'scan.glb');
   await editor.chooseFill(1);
-  assert.equal(editor.canChooseFill, false, 'nothing is mended');
+  assert.equal(editor.canVary, false, 'nothing is mended');
   const mended = editor.mend();
   await settled();
-  assert.equal(editor.canChooseFill, false, 'a session is being opened');
+  assert.equal(editor.canVary, false, 'a session is being opened');
   asked[0].answer();
   await mended;
 
@@ -284,7 +288,7 @@ test('a fill that is refused or stopped is none, and what waited for it is forgo
     await editor.chooseFill(2);
     end();
     await chosen;
-    assert.deepEqual([editor.alternative, editor.step.label, editor.canChooseFill], [0, 'Mend 1 hole', true]);
+    assert.deepEqual([editor.alternative, editor.step.label, editor.canVary], [0, 'Mend 1 hole', true]);
   }
   // A gesture that ends meanwhile goes first.
   const chosen = editor.chooseFill(1);

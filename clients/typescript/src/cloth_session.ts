@@ -3,6 +3,7 @@ import type { AnchorFound, AnchorQuery, Constraints, Report, Session, SessionHol
 import { Latest } from './latest.js';
 import { ProblemError } from './problem.js';
 import type { Progress } from './requests.js';
+import type { ResultHead } from './result_head.js';
 import type { MapEvents, Service } from './service.js';
 
 /** The new cloth of a hole at one moment. */
@@ -119,7 +120,11 @@ export class ClothSession {
 
   /** The new cloth as a GLB, one mesh a hole, with texture coordinates, colours and normals. */
   patches(constraints: Constraints, progress: Progress = {}): Promise<ArrayBuffer> {
-    return this.within(progress, (id) => this.service.patches(id, constraints, progress));
+    return this.within(progress, async (id) => {
+      const glb = await this.service.patches(id, constraints, progress);
+      this.met = JSON.stringify(constraints);
+      return glb;
+    });
   }
 
   /** Where on a hole's chart a point in space belongs. */
@@ -135,12 +140,16 @@ export class ClothSession {
   /** The whole scan under constraints. */
   result(constraints: Constraints, progress: Progress = {}): Promise<Blob> {
     return this.within(progress, async (id) => {
-      // After undo, the session may have met others since.
-      if (this.met !== JSON.stringify(constraints)) {
-        await this.service.mend(id, constraints, progress);
-        this.met = JSON.stringify(constraints);
-      }
+      await this.meet(id, constraints, progress);
       return this.service.result(id, progress);
+    });
+  }
+
+  /** The report of the same, which unlike others has the texture of each hole, and the JSON of its glTF; the buffers are not fetched. */
+  resultHead(constraints: Constraints, progress: Progress = {}): Promise<ResultHead> {
+    return this.within(progress, async (id) => {
+      await this.meet(id, constraints, progress);
+      return this.service.resultHead(id, progress);
     });
   }
 
@@ -151,6 +160,14 @@ export class ClothSession {
 
   private get id(): string {
     return this.opened.id ?? '';
+  }
+
+  /** Sees to it that the service met these constraints last: after undo it may have met others since. */
+  private async meet(id: string, constraints: Constraints, progress: Progress): Promise<void> {
+    if (this.met !== JSON.stringify(constraints)) {
+      await this.service.mend(id, constraints, progress);
+      this.met = JSON.stringify(constraints);
+    }
   }
 
   private async within<T>(progress: Progress, task: (id: string) => Promise<T>): Promise<T> {

@@ -33,6 +33,7 @@ export type Report = Schemas['Report'];
 export type Session = Schemas['Session'];
 export type SessionHole = Schemas['SessionHole'];
 export type Skipped = Schemas['Skipped'];
+export type TextureReport = Schemas['TextureReport'];
 export type WebhookEvent = Schemas['WebhookEvent'];
 
 /** A point or a direction in the scene's space. */

@@ -42,7 +42,7 @@ export function partsOf(contentType: string, answer: ArrayBuffer): Map<string, P
 }
 
 /** Index of an ASCII text in `bytes`, from `from` on; -1 when it is not there. */
-function find(bytes: Uint8Array, text: string, from: number): number {
+export function find(bytes: Uint8Array, text: string, from: number): number {
   const wanted = [...text].map((letter) => letter.charCodeAt(0));
   const last = bytes.length - wanted.length;
   for (let at = from; at <= last; at += 1) {

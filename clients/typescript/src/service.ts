@@ -14,6 +14,7 @@ import { Jobs } from './jobs.js';
 import { partsOf } from './multipart.js';
 import { ProblemError } from './problem.js';
 import { type Answer, type Progress, jsonOf, linesOf } from './requests.js';
+import { type ResultHead, headOfResult } from './result_head.js';
 import { type ServiceOptions, Transport, jsonBody } from './transport.js';
 
 /** Patches as positions: `x, y, z` of every patch vertex, hole after hole, in order of id. */
@@ -121,6 +122,12 @@ export class Service {
   async result(session: string, progress: Progress): Promise<Blob> {
     const answer = await this.transport.send(`sessions/${session}/result`, {}, progress);
     return new Blob([answer.body], { type: answer.contentType });
+  }
+
+  /** The report of the same, and the JSON of its glTF; the buffers are not fetched. */
+  async resultHead(session: string, progress: Progress): Promise<ResultHead> {
+    const request = { headers: { accept: 'multipart/mixed' }, signal: progress.signal ?? null };
+    return headOfResult(await this.transport.openPatiently(`sessions/${session}/result`, request, progress));
   }
 
   /** Ends a session; nothing waits for it, and it may be gone already. */

@@ -2,6 +2,7 @@
 import type { Anchor, Border, Constraints, Cut, Edit, Loop, SessionHole } from '../client.js';
 import { FILLS, isFill } from './fills.js';
 import { isHole } from './loops.js';
+import { TEXTURES, type Texture, isTexture } from './textures.js';
 
 /** Constraints without the choice of holes, which belongs to the session. */
 export interface ClothConstraints {
@@ -9,6 +10,8 @@ export interface ClothConstraints {
   readonly edits: readonly Edit[];
   /** Which of the plausible fills of each hole is applied, 0 the likeliest. */
   readonly alternative: number;
+  /** Where the patches' colours come from. */
+  readonly texture: Texture;
 }
 
 /** Cloth to cut out first, or a stretch of the cloth's own edge: an entry of `holes` that makes the hole that it fills. */
@@ -23,14 +26,14 @@ export interface Choice {
   readonly acceptDoubtful: boolean;
 }
 
-export const NO_CONSTRAINTS: ClothConstraints = { anchors: [], edits: [], alternative: 0 };
+export const NO_CONSTRAINTS: ClothConstraints = { anchors: [], edits: [], alternative: 0, texture: undefined };
 
 /**
  * Constraints on other holes than those they were made on: each goes with its hole, which is known by its rim, as a cut may change numbers. Those of
  * holes that are gone, or have another rim, are left out; those that name no hole are kept.
  */
 export function carried(
-  { anchors, edits, alternative }: ClothConstraints,
+  { anchors, edits, ...others }: ClothConstraints,
   before: readonly SessionHole[],
   after: readonly SessionHole[],
 ): ClothConstraints {
@@ -41,7 +44,7 @@ export function carried(
     const hole = item.hole === undefined ? undefined : renamed.get(item.hole);
     return item.hole === undefined ? [item] : hole === undefined ? [] : [{ ...item, hole }];
   };
-  return { anchors: anchors.flatMap(moved), edits: edits.flatMap(moved), alternative };
+  return { anchors: anchors.flatMap(moved), edits: edits.flatMap(moved), ...others };
 }
 
 /** The message for `POST /sessions/{id}/inpaint`. */
@@ -50,6 +53,7 @@ export function messageOf(constraints: ClothConstraints): Constraints {
     ...(constraints.anchors.length > 0 && { anchors: [...constraints.anchors] }),
     ...(constraints.edits.length > 0 && { edits: [...constraints.edits] }),
     ...(constraints.alternative > 0 && { alternative: constraints.alternative }),
+    ...(constraints.texture !== undefined && { texture: constraints.texture }),
   };
 }
 
@@ -116,6 +120,7 @@ export function readConstraints(text: string): ConstraintsFile {
     anchors = [],
     edits = [],
     alternative = 0,
+    texture,
     ...others
   } = value as Record<string, unknown>;
   const unknown = Object.keys(others);
@@ -131,7 +136,21 @@ export function readConstraints(text: string): ConstraintsFile {
   if (!isFill(alternative)) {
     throw new Error(`\`alternative\` must be a whole number from 0 to ${FILLS - 1}.`);
   }
-  return { ...chosenHoles(holes), acceptDoubtful, constraints: { anchors, edits, alternative } };
+  if (!isTexture(texture)) {
+    throw new Error(`\`texture\` must be one of ${TEXTURES.map(([name]) => name).join(', ')}.`);
+  }
+  return { ...chosenHoles(holes), acceptDoubtful, constraints: { anchors, edits, alternative, texture } };
+}
+
+/** What a file fills: where it chooses no holes those that are filled now, if any, otherwise all. */
+export function choiceOf(
+  { holes, made, acceptDoubtful }: ConstraintsFile,
+  step: Choice,
+  loops: readonly Loop[],
+): Choice {
+  const all = loops.filter(isHole).map((loop) => loop.id ?? 0);
+  const chosen = holes ?? (step.holes.length > 0 ? step.holes : all);
+  return { holes: [...chosen].sort((a, b) => a - b), made, acceptDoubtful };
 }
 
 function chosenHoles(holes: unknown): Pick<ConstraintsFile, 'holes' | 'made'> {

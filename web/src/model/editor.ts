@@ -19,17 +19,21 @@ import {
   type ClothConstraints,
   type MadeHole,
   carried,
-  messageOf,
+  choiceOf,
   readConstraints,
   statelessMessageOf,
 } from './constraints.js';
 import { type AnchorDraft, type Draft, NAMES, isMaking, madeBy, previewed, withAnchor, withGesture } from './draft.js';
 import { type FoundAnchor, type OpenScan, START, type Step, type Tool, type Work } from './editor_state.js';
-import { fillName, isFill } from './fills.js';
+import { isFill } from './fills.js';
+import { documentOf } from './gltf_document.js';
 import { History } from './history.js';
 import { isHole } from './loops.js';
 import { stepInWords } from './report.js';
+import { fetchedScan } from './scan_files.js';
 import { type Patch, ScanSession } from './scan_session.js';
+import type { Texture } from './textures.js';
+import { type Variation, WantedVariation } from './variation.js';
 
 /**
  * The editor's state. It emits `change` whenever something shown has changed, `opened` after another scan was opened, `mended` after holes
@@ -57,11 +61,14 @@ export class Editor extends EventTarget {
   /** The last result in words, for everybody and for screen readers. */
   message = '';
 
-  /** The fill that was asked for last, until it is a step. */
-  private wantedFill: number | undefined;
   private history = new History<Step>(START);
   private session: ScanSession | undefined;
   private readonly live = new Latest();
+  private readonly wanted = new WantedVariation({
+    step: () => this.step,
+    isBusy: () => this.work !== undefined,
+    apply: (label, constraints) => this.apply(label, this.step, constraints),
+  });
   private readonly limits: Promise<Info | undefined>;
 
   constructor(private readonly service: Service) {
@@ -80,12 +87,17 @@ export class Editor extends EventTarget {
 
   /** The plausible fill that is shown, or the one that is waited for: 0 is the likeliest. */
   get alternative(): number {
-    return this.wantedFill ?? this.step.constraints.alternative;
+    return this.wanted.newest.alternative;
   }
 
-  /** Whether another fill can be chosen: something is mended, and nothing else is under way. */
-  get canChooseFill(): boolean {
-    return this.step.patches.length > 0 && (this.work === undefined || this.wantedFill !== undefined);
+  /** Where the new cloth's colour comes from, or that which is waited for. */
+  get texture(): Texture {
+    return this.wanted.newest.texture;
+  }
+
+  /** Whether another fill or colour can be chosen: something is mended, and nothing else is under way. */
+  get canVary(): boolean {
+    return this.step.patches.length > 0 && (this.work === undefined || this.wanted.isWaiting);
   }
 
   /** The patches to show: those of the draft while there is one. */
@@ -117,8 +129,8 @@ export class Editor extends EventTarget {
       const bytes = await file.arrayBuffer();
       const { loops = [], candidates = [], notes = [] } = await this.service.holes(file, progress);
       this.session?.close();
-      this.session = new ScanSession(this.service, file, loops);
-      this.scan = { file, name, bytes, loops, candidates, notes };
+      this.scan = { file, name, bytes, loops, candidates, notes, document: documentOf(bytes) };
+      this.session = new ScanSession(this.service, this.scan);
       this.history = new History<Step>(START);
       this.chosen = new Set(loops.filter(isHole).map((loop) => loop.id ?? 0));
       this.skipped = [];
@@ -137,11 +149,7 @@ export class Editor extends EventTarget {
     const name = decodeURIComponent(address.pathname.split('/').pop() ?? '') || address.host;
     let file: Blob | undefined;
     await this.working(`Loading ${name}`, async ({ signal }) => {
-      const response = await fetch(address, { signal: signal ?? null });
-      if (!response.ok) {
-        throw new Error(`${address.href} answered with status ${response.status}.`);
-      }
-      file = new Blob([await response.arrayBuffer()], { type: 'model/gltf-binary' });
+      file = await fetchedScan(address, signal);
     });
     if (file !== undefined) {
       await this.open(file, name);
@@ -202,7 +210,7 @@ export class Editor extends EventTarget {
         return;
       }
       try {
-        const patches = await session.preview(step, messageOf(constraints));
+        const patches = await session.preview(step, constraints);
         if (this.draft !== undefined && this.step === step) {
           this.draftPatches = patches;
           this.changed();
@@ -238,25 +246,21 @@ export class Editor extends EventTarget {
     this.changed();
   }
 
-  /** Shows another of the plausible fills of the mended holes. One request is in flight, and the newest choice waits. */
+  /** Shows another of the plausible fills of the mended holes. */
   async chooseFill(alternative: number): Promise<void> {
-    if (!this.canChooseFill || !isFill(alternative)) {
-      return;
+    if (isFill(alternative)) {
+      await this.vary({ alternative });
     }
-    const isAsking = this.wantedFill !== undefined;
-    this.wantedFill = alternative;
-    this.changed();
-    if (isAsking) {
-      return;
+  }
+
+  /** Chooses a fill, or where the colour comes from, for all mended holes. One request is in flight, and the newest choice waits. */
+  async vary(change: Partial<Variation>): Promise<void> {
+    if (this.canVary) {
+      const shown = this.wanted.choose(change);
+      this.changed();
+      await shown;
+      this.changed();
     }
-    let step: Step | undefined;
-    // Until the newest choice is shown, one was refused, or something else was begun meanwhile.
-    while (this.step !== step && this.work === undefined && this.alternative !== this.step.constraints.alternative) {
-      step = this.step;
-      await this.apply(fillName(this.alternative), step, { ...step.constraints, alternative: this.alternative });
-    }
-    this.wantedFill = undefined;
-    this.changed();
   }
 
   /** Finds where on a hole's chart a point in space belongs. */
@@ -354,12 +358,9 @@ export class Editor extends EventTarget {
       this.report(error);
       return;
     }
-    const { scan, step } = this;
-    const all = (scan?.loops ?? []).filter(isHole).map((loop) => loop.id ?? 0);
-    const holes = [...(file.holes ?? (step.holes.length > 0 ? step.holes : all))].sort((a, b) => a - b);
-    const { made, acceptDoubtful } = file;
-    this.acceptDoubtful = acceptDoubtful;
-    await this.apply('Load constraints', { holes, made, acceptDoubtful }, file.constraints);
+    const choice = choiceOf(file, this.step, this.scan?.loops ?? []);
+    this.acceptDoubtful = choice.acceptDoubtful;
+    await this.apply('Load constraints', choice, file.constraints);
     this.choose(new Set(this.step.holes));
   }
 
@@ -368,7 +369,7 @@ export class Editor extends EventTarget {
     let result: Blob | undefined;
     await this.working('Saving', async (progress) => {
       const { holes, constraints } = this.step;
-      result = await this.session?.result(this.step, messageOf(constraints), progress);
+      result = await this.session?.result(this.step, constraints, progress);
       this.message = `Saved with ${holes.length} filled ${holes.length === 1 ? 'hole' : 'holes'}.`;
     });
     return result;
@@ -437,7 +438,7 @@ export class Editor extends EventTarget {
     if (session === undefined) {
       return;
     }
-    const { patches, report } = await session.mend(choice, messageOf(constraints), progress);
+    const { patches, report } = await session.mend(choice, constraints, progress);
     const { skipped, cutFaces } = session;
     this.skipped = skipped;
     const holes = patches.map((patch) => patch.hole.id ?? 0);

@@ -2,6 +2,7 @@
 import type { AnchorFound, BorderCandidate, Loop, Report } from '../client.js';
 import { type Choice, type ClothConstraints, NO_CONSTRAINTS } from './constraints.js';
 import type { DraftKind } from './draft.js';
+import type { GltfDocument } from './gltf_document.js';
 import type { Patch } from './scan_session.js';
 
 /** A state that undo can return to: what is filled, and how. It has the positions, so that it is shown at once. */
@@ -27,6 +28,8 @@ export interface OpenScan {
   /** Bites and rips at the cloth's own edge. */
   readonly candidates: readonly BorderCandidate[];
   readonly notes: readonly string[];
+  /** The JSON of its glTF. */
+  readonly document: GltfDocument;
 }
 
 /** Something that takes time, as shown to the person. */

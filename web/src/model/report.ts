@@ -3,6 +3,7 @@ import type { Confidence, HoleReport, Report } from '../client.js';
 import type { Step } from './editor_state.js';
 import { fillInWords, fillName } from './fills.js';
 import { short } from './loops.js';
+import { colourInWords, textureInWords, textureName } from './textures.js';
 
 const NO_CHART = 'The cloth around it cannot be laid flat: a fair surface without folds, which takes no gestures.';
 
@@ -19,6 +20,7 @@ export function holeInWords(hole: HoleReport): string[] {
     `${stretchInWords(patch.stretchMean, patch.stretchMax)} ${crossingsInWords(patch.selfIntersections ?? 0)}`,
     patch.method === 'fair' ? NO_CHART : shareInWords(patch.networkShare),
     alternative > 0 ? fillInWords(alternative) : '',
+    hole.texture === undefined ? '' : colourInWords(hole.texture),
     confidenceInWords(patch.confidence, (hole.anchors ?? []).length + (hole.edits ?? []).length),
   ];
   if (hole.cut !== undefined && (hole.cut.faces ?? 0) > 0) {
@@ -50,6 +52,9 @@ export function reportInWords(report: Report): string {
 export function stepInWords({ label, constraints, patches, report }: Step): string {
   if (label === fillName(constraints.alternative)) {
     return fillInWords(constraints.alternative, report);
+  }
+  if (label === textureName(constraints.texture)) {
+    return textureInWords(constraints.texture, report);
   }
   const faces = patches.reduce((sum, patch) => sum + (patch.hole.patchFaces?.length ?? 0) / 3, 0);
   return `${label}: ${patches.length} filled, ${faces.toLocaleString('en')} new triangles.`;

@@ -45,6 +45,19 @@ export async function scanOf(files: readonly NamedFile[]): Promise<{ file: Blob;
   return { file: new Blob([JSON.stringify(gltf)], { type: 'model/gltf+json' }), name };
 }
 
+/**
+ * The scan at an address.
+ *
+ * @throws When the answer is none.
+ */
+export async function fetchedScan(address: URL, signal: AbortSignal | undefined): Promise<Blob> {
+  const response = await fetch(address, { signal: signal ?? null });
+  if (!response.ok) {
+    throw new Error(`${address.href} answered with status ${response.status}.`);
+  }
+  return new Blob([await response.arrayBuffer()], { type: 'model/gltf-binary' });
+}
+
 function beside(files: readonly NamedFile[], uri: string): NamedFile {
   const wanted = decodeURIComponent(uri).split('/').pop();
   const found = files.find(({ name }) => name === wanted);

@@ -2,25 +2,32 @@
 import {
   type AnchorFound,
   type AnchorQuery,
-  type Constraints,
   type HolePositions,
-  type Loop,
+  type HoleReport,
   type MapEvents,
   type Progress,
   type Report,
   type Service,
   type SessionHole,
   type Skipped,
+  type TextureReport,
   ClothSession,
 } from '../client.js';
-import { type Choice, selectionOf } from './constraints.js';
+import { type Choice, type ClothConstraints, NO_CONSTRAINTS, messageOf, selectionOf } from './constraints.js';
+import type { OpenScan } from './editor_state.js';
+import { type GltfDocument, type PlainColour, hasColours, plainColours } from './gltf_document.js';
+import type { Texture } from './textures.js';
 
-/** What the patches of a session look like: texture coordinates, colours and materials, which no constraints change. */
+/** What the patches of a session look like: texture coordinates, colours and materials, which of all constraints `texture` alone changes. */
 export interface Dressing {
   /** The patches under no constraints, one mesh a hole. Their vertices are the corners of the surface: more than patch vertices at seams. */
   readonly glb: ArrayBuffer;
   /** The positions of the patch vertices in the same state, by hole id. */
   readonly positions: ReadonlyMap<number, Float32Array>;
+  /** Where the colours come from, by hole id; empty where the scan has none. */
+  readonly textures: ReadonlyMap<number, TextureReport>;
+  /** The colours of patches without images, by hole id. */
+  readonly colours: ReadonlyMap<number, PlainColour>;
 }
 
 /** A hole's new cloth. */
@@ -34,8 +41,12 @@ interface Opened {
   readonly asked: string;
   readonly filled: string;
   readonly cloth: ClothSession;
-  readonly dressing: Dressing;
+  /** Those that were shown. */
+  readonly dressings: Map<Texture, Dressing>;
 }
+
+/** What a session needs of a scan. */
+type Scanned = Pick<OpenScan, 'file' | 'loops' | 'document'>;
 
 /** A scan at the service. Every method names the holes that must be filled: a session is opened on them unless the last one was. */
 export class ScanSession {
@@ -43,8 +54,7 @@ export class ScanSession {
 
   constructor(
     private readonly service: Service,
-    private readonly scan: Blob,
-    private readonly loops: readonly Loop[],
+    private readonly scan: Scanned,
   ) {}
 
   /** The loops that are left as they are. */
@@ -65,18 +75,20 @@ export class ScanSession {
   /** The patches under constraints, and the report. */
   async mend(
     choice: Choice,
-    constraints: Constraints,
+    constraints: ClothConstraints,
     progress: Progress,
   ): Promise<{ patches: Patch[]; report: Report }> {
     const opened = await this.open(choice, progress);
-    const { patches, report } = await opened.cloth.mend(constraints, progress);
-    return { patches: dressed(patches, opened), report };
+    const dressing = await this.dress(opened, constraints.texture, progress);
+    const { patches, report } = await opened.cloth.mend(messageOf(constraints), progress);
+    return { patches: dressed(patches, dressing), report: withTextures(report, dressing) };
   }
 
   /** The patches under constraints, as fast as the service can. */
-  async preview(choice: Choice, constraints: Constraints): Promise<Patch[]> {
+  async preview(choice: Choice, constraints: ClothConstraints): Promise<Patch[]> {
     const opened = await this.open(choice, {});
-    return dressed(await opened.cloth.draft(constraints), opened);
+    const dressing = await this.dress(opened, constraints.texture, {});
+    return dressed(await opened.cloth.draft(messageOf(constraints)), dressing);
   }
 
   /** Where on a hole's chart a point belongs. */
@@ -90,8 +102,8 @@ export class ScanSession {
   }
 
   /** The whole scan under constraints. */
-  async result(choice: Choice, constraints: Constraints, progress: Progress): Promise<Blob> {
-    return (await this.open(choice, progress)).cloth.result(constraints, progress);
+  async result(choice: Choice, constraints: ClothConstraints, progress: Progress): Promise<Blob> {
+    return (await this.open(choice, progress)).cloth.result(messageOf(constraints), progress);
   }
 
   /** Ends the session. */
@@ -105,14 +117,37 @@ export class ScanSession {
     if (this.opened !== undefined && [this.opened.asked, this.opened.filled].includes(asked)) {
       return this.opened;
     }
-    const cloth = await ClothSession.open(this.service, this.scan, selectionOf(this.loops, choice), progress);
-    const unconstrained = await cloth.positions({}, progress);
-    const glb = await cloth.patches({}, progress);
-    const positions = new Map(unconstrained.map((patch) => [patch.hole.id ?? 0, patch.positions]));
+    const { file, loops } = this.scan;
+    const cloth = await ClothSession.open(this.service, file, selectionOf(loops, choice), progress);
     this.close();
-    const filled = keyOf({ ...choice, holes: [...positions.keys()] });
-    this.opened = { asked, filled, cloth, dressing: { glb, positions } };
+    const filled = keyOf({ ...choice, holes: cloth.holes.map(({ id = 0 }) => id) });
+    this.opened = { asked, filled, cloth, dressings: new Map() };
     return this.opened;
+  }
+
+  /** What the patches look like by where their colours come from, asked once for each session. */
+  private async dress({ cloth, dressings }: Opened, texture: Texture, progress: Progress): Promise<Dressing> {
+    const kept = dressings.get(texture);
+    if (kept !== undefined) {
+      return kept;
+    }
+    const constraints = messageOf({ ...NO_CONSTRAINTS, texture });
+    const unconstrained = await cloth.positions(constraints, progress);
+    const glb = await cloth.patches(constraints, progress);
+    const { document } = this.scan;
+    // Of plain cloth there is nothing to say, and the scan need not be written for it.
+    const head = hasColours(document) ? await cloth.resultHead(constraints, progress) : undefined;
+    const holes = head?.report.holes ?? [];
+    const dressing = {
+      glb,
+      positions: new Map(unconstrained.map((patch) => [patch.hole.id ?? 0, patch.positions])),
+      textures: new Map(
+        holes.flatMap(({ id = 0, texture: said }) => (said === undefined ? [] : [[id, said] as const])),
+      ),
+      colours: plainColours((head?.document ?? {}) as GltfDocument, document, withoutImages(holes)),
+    };
+    dressings.set(texture, dressing);
+    return dressing;
   }
 }
 
@@ -121,6 +156,22 @@ function keyOf({ holes, made, acceptDoubtful }: Choice): string {
   return JSON.stringify([holes, made, acceptDoubtful]);
 }
 
-function dressed(patches: readonly HolePositions[], { dressing }: Opened): Patch[] {
+function dressed(patches: readonly HolePositions[], dressing: Dressing): Patch[] {
   return patches.map((patch) => ({ ...patch, dressing }));
+}
+
+/** The holes whose colour is neither in images nor the scan's, by id. */
+function withoutImages(holes: readonly HoleReport[]): Set<number> {
+  return new Set(
+    holes.filter(({ texture }) => ['flat', 'none'].includes(texture?.method ?? '')).map(({ id = 0 }) => id),
+  );
+}
+
+/** A report of positions alone, which says nothing of colours, with them. */
+function withTextures(report: Report, { textures }: Dressing): Report {
+  const holes = (report.holes ?? []).map((hole) => {
+    const texture = textures.get(hole.id ?? 0);
+    return texture === undefined ? hole : { ...hole, texture };
+  });
+  return { ...report, holes };
 }

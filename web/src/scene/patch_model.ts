@@ -1,10 +1,12 @@
 /** The new cloth of one hole as three.js shows it: its surface follows the patch's positions, and a hit on it has a uv. */
 import type { Uv } from '../client.js';
 import { type ClothPoint, hasChart, locate } from '../model/cloth.js';
+import type { PlainColour } from '../model/gltf_document.js';
 import type { Patch } from '../model/scan_session.js';
 import {
   BufferAttribute,
   BufferGeometry,
+  Color,
   DoubleSide,
   GLTFLoader,
   type Intersection,
@@ -52,6 +54,8 @@ export class PatchModel {
   private readonly rim: number;
   /** The normals of the first state: those at the rim agree with the scan's and stay. */
   private readonly firstNormals: Float32Array;
+  /** Colours of the corners that belong to the cloth, as a scan has them at its vertices. */
+  private readonly ownColors: BufferAttribute | undefined;
   /** Of each corner: -1 where the surface shows the other side there. */
   private readonly sides: Float32Array;
 
@@ -79,10 +83,12 @@ export class PatchModel {
       );
       return dot < 0 ? -1 : 1;
     });
+    this.ownColors = image === null ? ownColors(patch, this.corners.length) : undefined;
     surface.setAttribute('position', vectors(new Float32Array(3 * this.corners.length)));
     surface.setAttribute('normal', vectors(new Float32Array(3 * this.corners.length)));
     this.mesh = new Mesh(surface, material);
     this.mesh.name = `hole ${id}`;
+    this.unpaint();
     this.update(patch);
   }
 
@@ -139,6 +145,16 @@ export class PatchModel {
       ofCorners.set(colors.subarray(3 * vertex, 3 * vertex + 3), 3 * corner);
     }
     this.mesh.geometry.setAttribute('color', vectors(ofCorners));
+  }
+
+  /** Gives it the colours back that it has without a heat map. */
+  unpaint(): void {
+    const { geometry } = this.mesh;
+    if (this.ownColors === undefined) {
+      geometry.deleteAttribute('color');
+    } else {
+      geometry.setAttribute('color', this.ownColors);
+    }
   }
 
   private numbers(): VertexNumbers {
@@ -200,6 +216,26 @@ function nearest(vertices: Float32Array, point: Float32Array): number {
   return best.vertex;
 }
 
+/** The colours of a scan's vertices as they go on in a patch of so many corners, or their mean where one colour was asked for. */
+function ownColors({ hole, dressing }: Patch, corners: number): BufferAttribute | undefined {
+  const colors = Float32Array.from(hole.surface?.colors ?? []);
+  const id = hole.id ?? 0;
+  // A patch that does not continue the scan may have corners of its own.
+  if (dressing.colours.has(id) || corners === 0 || colors.length !== 4 * corners) {
+    return undefined;
+  }
+  if (dressing.textures.get(id)?.method === 'flat') {
+    const mean = [0, 1, 2, 3].map((channel) => {
+      return colors.reduce((sum, value, at) => (at % 4 === channel ? sum + value : sum), 0) / corners;
+    });
+    return new BufferAttribute(
+      colors.map((_, at) => mean[at % 4] as number),
+      4,
+    );
+  }
+  return new BufferAttribute(colors, 4);
+}
+
 /** Unit normals of vertices: the mean of their faces', weighted by area. */
 function vertexNormals(positions: Float32Array, faces: readonly number[]): Float32Array {
   const normals = new Float32Array(positions.length);
@@ -225,6 +261,11 @@ function vertexNormals(positions: Float32Array, faces: readonly number[]): Float
 
 /** New cloth in a colour of its own. */
 export const TINT = 0xf0a35e;
+
+/** The material of a patch in one colour. */
+export function plainlyColoured({ color, roughness, metalness }: PlainColour): Material {
+  return new MeshStandardMaterial({ color: new Color(...color), roughness, metalness, side: DoubleSide });
+}
 
 /**
  * The material of a patch that continues the scan's: its own copy, so that the scan's can be exchanged. With an image of the patch's own it has that

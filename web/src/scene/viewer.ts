@@ -22,7 +22,7 @@ import {
 import { stretchBetween, pointsOf } from './border_stretch.js';
 import { linesOfLoops } from './boundary.js';
 import { Marks } from './marks.js';
-import { PatchModel, type Surface, TINT, blendedMaterial, readSurfaces } from './patch_model.js';
+import { PatchModel, type Surface, TINT, blendedMaterial, plainlyColoured, readSurfaces } from './patch_model.js';
 import { Rims } from './rims.js';
 import { type Heat, type HeatScale, heatColors, ownColors, scaleOf } from './heat_colors.js';
 import { ScanModel, type Shading, heatOf, plainMaterial } from './scan_model.js';
@@ -41,7 +41,7 @@ export interface Look {
   readonly split: number;
 }
 
-const FIRST_LOOK: Look = { shading: 'textured', tinted: true, outlined: true, before: false, split: 0 };
+export const FIRST_LOOK: Look = { shading: 'textured', tinted: true, outlined: true, before: false, split: 0 };
 
 /** What is under the pointer. */
 export interface Hit {
@@ -223,6 +223,9 @@ export class Viewer {
     for (const patch of this.patches) {
       patch.mesh.material.dispose();
       patch.mesh.material = this.materialOf(patch.shown, patch.image);
+      if (heatOf(this.shading) === undefined) {
+        patch.unpaint();
+      }
     }
   }
 
@@ -394,7 +397,7 @@ export class Viewer {
     this.raycaster.setFromCamera(device, this.camera);
   }
 
-  private materialOf({ hole }: Patch, image: Texture | null): Material {
+  private materialOf({ hole, dressing }: Patch, image: Texture | null): Material {
     const { shading } = this;
     const { tinted } = this.look;
     if (tinted && heatOf(shading) === undefined) {
@@ -402,6 +405,10 @@ export class Viewer {
     }
     if (shading !== 'textured') {
       return plainMaterial(0xb9bec6, shading);
+    }
+    const plain = dressing.colours.get(hole.id ?? 0);
+    if (plain !== undefined) {
+      return plainlyColoured(plain);
     }
     const scan = this.scan?.materialNear(new Vector3().fromArray(hole.rimPositions ?? [0, 0, 0]));
     return blendedMaterial(scan, image);

@@ -14,6 +14,7 @@ import { withoutLastCorner } from '../model/draft.js';
 import { Editor } from '../model/editor.js';
 import { scanOf } from '../model/scan_files.js';
 import { Service } from '../client.js';
+import { FIRST_LOOK, type Look } from '../scene/viewer.js';
 import { type TemplateResult, LitElement, css, html, nothing } from '../vendor.js';
 import { download } from './download.js';
 import './chart_panel.js';
@@ -136,6 +137,8 @@ export class EditorElement extends LitElement {
   declare key: string | undefined;
   declare baseUrl: string | undefined;
   private dragging = false;
+  /** The look that was chosen. */
+  private shown = FIRST_LOOK;
   private made: Editor | undefined;
 
   constructor() {
@@ -261,7 +264,7 @@ export class EditorElement extends LitElement {
                 <darn-holes .editor=${editor}></darn-holes>
                 <darn-tools .editor=${editor}></darn-tools>
                 <darn-chart .editor=${editor}></darn-chart>
-                <darn-look .editor=${editor}></darn-look>
+                <darn-look .editor=${editor} .shown=${this.shown}></darn-look>
                 <darn-report .editor=${editor}></darn-report>
                 <darn-constraints .editor=${editor}></darn-constraints>
               `
@@ -379,7 +382,11 @@ export class EditorElement extends LitElement {
 
   private readonly frame = (event: CustomEvent<number>): void => this.stage?.viewer?.frame(event.detail);
 
-  private readonly look = (event: CustomEvent<object>): void => this.stage?.viewer?.setLook(event.detail);
+  private readonly look = (event: CustomEvent<Partial<Look>>): void => {
+    this.shown = { ...this.shown, ...event.detail };
+    this.stage?.viewer?.setLook(event.detail);
+    this.requestUpdate();
+  };
 
   private readonly keyDown = (event: KeyboardEvent): void => {
     if (!this.isMeant(event)) {

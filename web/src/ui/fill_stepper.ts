@@ -32,13 +32,13 @@ export class FillStepper extends Panel {
 
   protected override render(): TemplateResult {
     const { editor } = this;
-    const { step, alternative, canChooseFill } = editor;
+    const { step, alternative, canVary } = editor;
     const only = onlyFillInWords(step.constraints.alternative, step.report);
     // At an end a button keeps the keyboard's focus, which one that is disabled would lose.
     const button = (sign: string, name: string, next: number): TemplateResult => html`
       <button
         aria-label=${name}
-        ?disabled=${!canChooseFill}
+        ?disabled=${!canVary}
         aria-disabled=${next < 0 || next >= FILLS}
         @click=${() => void editor.chooseFill(next)}
       >
@@ -48,7 +48,7 @@ export class FillStepper extends Panel {
     return html`
       <div class="row" role="group" aria-label="Fills">
         ${button('‹', 'Previous fill', alternative - 1)}
-        <span class=${canChooseFill ? '' : 'quiet'}>${fillName(alternative)}</span>
+        <span class=${canVary ? '' : 'quiet'}>${fillName(alternative)}</span>
         ${button('›', 'Next fill', alternative + 1)}
       </div>
       ${only === undefined ? nothing : html`<p class="small">${only}</p>`}

@@ -5,6 +5,7 @@ import { byKind, isFillable, isHole, short, styleOf } from '../model/loops.js';
 import { type TemplateResult, css, html, nothing, svg } from '../vendor.js';
 import './fill_stepper.js';
 import { Panel } from './panel.js';
+import './texture_choice.js';
 
 /** Reasons to leave a loop that are only this list's own choice. */
 const CHOICES = new Set(['not_selected', 'excepted', 'outer_boundary', 'tube_end', 'opening']);
@@ -79,6 +80,7 @@ export class HolesPanel extends Panel {
         <button ?disabled=${chosen.size === 0} @click=${() => this.editor.choose(new Set())}>None</button>
       </div>
       <darn-fill .editor=${this.editor}></darn-fill>
+      <darn-texture .editor=${this.editor}></darn-texture>
     `;
   }
 

@@ -34,6 +34,11 @@ export class LookPanel extends Panel {
     `,
   ].flat();
 
+  static override properties = { shown: {} };
+
+  /** What is drawn, as it was chosen here or elsewhere. */
+  declare shown: Pick<Look, 'tinted' | 'outlined'>;
+
   protected override render(): TemplateResult {
     return html`
       <h2>Look</h2>
@@ -54,8 +59,8 @@ export class LookPanel extends Panel {
           )}
         </div>
       </fieldset>
-      <div>${this.check('New cloth in its own colour', (tinted) => ({ tinted }))}</div>
-      <div>${this.check('Outlines of holes and borders', (outlined) => ({ outlined }))}</div>
+      <div>${this.check('New cloth in its own colour', 'tinted')}</div>
+      <div>${this.check('Outlines of holes and borders', 'outlined')}</div>
       <label class="compare">
         Before and after (hold B for before)
         <input
@@ -70,9 +75,9 @@ export class LookPanel extends Panel {
     `;
   }
 
-  private check(name: string, change: (checked: boolean) => Partial<Look>): TemplateResult {
-    const changed = (event: Event): void => this.look(change((event.target as HTMLInputElement).checked));
-    return html`<label><input type="checkbox" checked @change=${changed} />${name}</label>`;
+  private check(name: string, part: 'tinted' | 'outlined'): TemplateResult {
+    const changed = (event: Event): void => this.look({ [part]: (event.target as HTMLInputElement).checked });
+    return html`<label><input type="checkbox" .checked=${this.shown[part]} @change=${changed} />${name}</label>`;
   }
 
   private look(detail: Partial<Look>): void {
