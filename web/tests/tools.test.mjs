@@ -456,16 +456,23 @@ inEditor('a map is drawn while its cells come, does not hold up a drag, and can 
   // The cloth is dragged while the map comes, over and over: no cell may come between.
   await page.getByLabel('Point y').fill('-0.1');
   await page.keyboard.press('Tab');
+  // Stopped in the page, with the first cells: on a fast machine the map is complete before a click comes from here, or before the page is asked again.
+  await page.evaluate(() => {
+    const element = document.querySelector('darn-editor');
+    const within = (root) =>
+      [...root.querySelectorAll('*')].flatMap((it) => (it.shadowRoot ? [it, ...within(it.shadowRoot)] : [it]));
+    const stop = () => {
+      const buttons = within(element.shadowRoot).filter((it) => it.localName === 'button');
+      const button = buttons.find((it) => it.textContent.trim() === 'Stop the map');
+      if (element.editor.map?.share > 0 && button !== undefined) {
+        element.editor.removeEventListener('change', stop);
+        button.click();
+      }
+    };
+    element.editor.addEventListener('change', stop);
+  });
   await editor.button('Draw the map').click();
-  // Stopped in the page, as soon as the first cells are there: on a fast machine the map is complete before a click comes from here.
-  const stop = await editor.button('Stop the map').elementHandle();
-  await page.waitForFunction((button) => {
-    const { map } = document.querySelector('darn-editor').editor;
-    if (map?.share > 0) {
-      button.click();
-    }
-    return map?.share > 0;
-  }, stop);
+  await page.waitForFunction(() => document.querySelector('darn-editor').editor.map?.share > 0);
   const rects = page.locator('darn-chart rect');
   const share = await editor.model((it) => it.map.share);
   assert.ok(share > 0 && share < 1, `${share}`);
