@@ -108,11 +108,7 @@ impl<'a> Inpainter<'a> {
 
     /// Its weights, as a report names them.
     pub fn weights(&self) -> v1::Weights {
-        let card = self.card();
-        v1::Weights {
-            name: card.name.clone(),
-            sha256: card.sha256.clone(),
-        }
+        weights_of(self.card())
     }
 
     /// Predicts every cell of every grid, in the network's units.
@@ -161,6 +157,14 @@ impl<'a> Inpainter<'a> {
         uvs: &[[f32; 2]],
     ) -> Result<Vec<AnchorLoss>, NetError> {
         self.network.anchor_gradients(problem, uvs)
+    }
+}
+
+/// The weights of a card, as the contract names them.
+pub fn weights_of(card: &WeightsCard) -> v1::Weights {
+    v1::Weights {
+        name: card.name.clone(),
+        sha256: card.sha256.clone(),
     }
 }
 

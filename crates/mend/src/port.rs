@@ -15,6 +15,7 @@ use darn_gltf_scan::{Container, Scan};
 
 use crate::error::MendError;
 use crate::formed_scan::formed;
+use crate::inpainter::weights_of;
 use crate::mender::{Call, NetworkMender};
 use crate::session::{ScanSession, SessionDraft};
 use crate::timings::add_read_time;
@@ -138,14 +139,7 @@ impl Mender for SharedMender {
     }
 
     fn weights(&self) -> Vec<v1::Weights> {
-        self.0
-            .networks
-            .cards()
-            .map(|card| v1::Weights {
-                name: card.name.clone(),
-                sha256: card.sha256.clone(),
-            })
-            .collect()
+        self.0.networks.cards().map(weights_of).collect()
     }
 
     fn warm_up(&self) -> Result<(), Refusal> {
