@@ -44,25 +44,27 @@ def read_glb(path):
     return positions, faces
 
 
-def write_glb(path, positions, faces):
-    """One mesh as GLB."""
-    positions, faces = positions.astype("<f4"), faces.astype("<u4")
-    binary = positions.tobytes() + faces.tobytes()
+def write_glb(path, positions, *parts):
+    """One mesh as GLB: a primitive of the triangles of each part. Those after the first are marked as new cloth, which `darn render` tints."""
+    positions, parts = positions.astype("<f4"), [faces.astype("<u4") for faces in parts]
+    binary = positions.tobytes() + b"".join(faces.tobytes() for faces in parts)
     low, high = positions.min(0).tolist(), positions.max(0).tolist()
+    accessors = [{"bufferView": 0, "componentType": 5126, "count": len(positions), "type": "VEC3", "min": low, "max": high}]
+    views = [{"buffer": 0, "byteOffset": 0, "byteLength": positions.nbytes}]
+    primitives = []
+    for number, faces in enumerate(parts, 1):
+        accessors.append({"bufferView": number, "componentType": 5125, "count": faces.size, "type": "SCALAR"})
+        views.append({"buffer": 0, "byteOffset": views[-1]["byteOffset"] + views[-1]["byteLength"], "byteLength": faces.nbytes})
+        mark = {"extras": {"darn": {"reconstructed": True}}} if number > 1 else {}
+        primitives.append({"attributes": {"POSITION": 0}, "indices": number, **mark})
     document = {
         "asset": {"version": "2.0"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
-        "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": len(positions), "type": "VEC3", "min": low, "max": high},
-            {"bufferView": 1, "componentType": 5125, "count": faces.size, "type": "SCALAR"},
-        ],
-        "bufferViews": [
-            {"buffer": 0, "byteLength": positions.nbytes},
-            {"buffer": 0, "byteOffset": positions.nbytes, "byteLength": faces.nbytes},
-        ],
+        "meshes": [{"primitives": primitives}],
+        "accessors": accessors,
+        "bufferViews": views,
         "buffers": [{"byteLength": len(binary)}],
     }
     text = json.dumps(document).encode()
