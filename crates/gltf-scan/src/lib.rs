@@ -39,6 +39,8 @@ mod mesh_file;
 mod pack;
 mod patch_appearance;
 mod patch_group;
+#[cfg(test)]
+mod patch_group_tests;
 mod patch_images;
 mod patch_materials;
 mod patch_primitive;
@@ -47,7 +49,10 @@ mod primitive;
 mod read;
 #[cfg(test)]
 mod read_tests;
+#[cfg(test)]
+mod refusal_tests;
 mod scan;
+mod scan_reader;
 mod scene;
 mod skin;
 mod strip;

@@ -1,8 +1,10 @@
 //! Small scans for tests.
 
-use serde_json::{Value, json};
+use darn_geometry::mesh::Vec3;
+use serde_json::{Map, Value, json};
 
 use super::container::pack_glb;
+use super::{PatchPoint, PatchPrimitive, Scan};
 
 /// A scan under construction: JSON that a test may edit freely, and the bytes of its first buffer.
 #[derive(Debug, Clone)]
@@ -148,4 +150,74 @@ impl Builder {
         });
         self.json.to_string().into_bytes()
     }
+}
+
+fn object(value: Value) -> Map<String, Value> {
+    let Value::Object(object) = value else {
+        panic!("{value} is no object")
+    };
+    object
+}
+
+/// A tent over the first three vertices of a part: one new point, three triangles.
+pub(crate) fn tent(scan: &Scan, part: usize, top: Vec3) -> PatchPrimitive {
+    let look = &scan.parts[part];
+    let first = look.vertices.start;
+    let rim = (first..first + 3).map(PatchPoint::Scan);
+    PatchPrimitive {
+        part,
+        material_of: part,
+        points: rim.chain([PatchPoint::New(top)]).collect(),
+        faces: vec![[0, 1, 3], [1, 2, 3], [2, 0, 3]],
+        both_sides: false,
+        appearance: Default::default(),
+        normals: vec![Vec3::new(0.0, 0.0, 3.0); 4],
+        texcoords: vec![vec![[0.25, 0.5]; 4]; look.texcoords.len()],
+        colors: vec![vec![[0.1, 0.2, 0.3, 0.4]; 4]; look.colors.len()],
+        name: "hole 0".into(),
+        deviations: Vec::new(),
+        hole: object(json!({"id": 0})),
+        method: object(json!({"weights": {"name": "standard"}})),
+    }
+}
+
+/// The JSON of a file and the bytes of its buffer.
+pub(crate) fn parsed(bytes: &[u8]) -> (Value, Vec<u8>) {
+    let layout = super::container::layout(bytes).unwrap();
+    let bin = layout
+        .bin
+        .map(|range| bytes[range].to_vec())
+        .unwrap_or_default();
+    (serde_json::from_slice(&bytes[layout.json]).unwrap(), bin)
+}
+
+/// Positions and triangles of the last primitive of the first mesh, as the `gltf` crate reads them.
+pub(crate) fn read_by_gltf(bytes: &[u8]) -> (Vec<[f32; 3]>, Vec<u16>) {
+    let gltf::Gltf { document, blob } = gltf::Gltf::from_slice(bytes).unwrap();
+    let blob = blob.unwrap();
+    let primitive = document
+        .meshes()
+        .next()
+        .unwrap()
+        .primitives()
+        .last()
+        .unwrap();
+    let span = |accessor: gltf::Accessor<'_>| {
+        let start = accessor.view().unwrap().offset() + accessor.offset();
+        blob[start..start + accessor.count() * accessor.size()].to_vec()
+    };
+    let positions = span(primitive.get(&gltf::Semantic::Positions).unwrap());
+    let float = |i: usize| f32::from_le_bytes(positions[4 * i..][..4].try_into().unwrap());
+    let indices = primitive.indices().unwrap();
+    assert_eq!(indices.data_type(), gltf::accessor::DataType::U16);
+    let indices = span(indices);
+    (
+        (0..positions.len() / 12)
+            .map(|i| [0, 1, 2].map(|k| float(3 * i + k)))
+            .collect(),
+        indices
+            .chunks_exact(2)
+            .map(|b| u16::from_le_bytes([b[0], b[1]]))
+            .collect(),
+    )
 }
