@@ -86,12 +86,20 @@ fn line(rim: &Loop) -> String {
     )
 }
 
-fn candidate_line(bite: &BorderCandidate) -> String {
-    let border = serde_json::to_string(&bite.border).unwrap_or_default();
-    format!(
-        "bite or rip at loop {}, {:.4} wide and {:.4} deep\n      border: {border}\n",
-        bite.r#loop, bite.mouth, bite.depth
-    )
+fn candidate_line(candidate: &BorderCandidate) -> String {
+    let border = serde_json::to_string(&candidate.border).unwrap_or_default();
+    let BorderCandidate { r#loop: id, .. } = candidate;
+    let what = match candidate.facing_loop {
+        Some(facing) => format!(
+            "tear between loops {id} and {facing}, {:.4} long and {:.4} wide",
+            candidate.length, candidate.mouth
+        ),
+        None => format!(
+            "bite or rip at loop {id}, {:.4} wide and {:.4} deep",
+            candidate.mouth, candidate.depth
+        ),
+    };
+    format!("{what}\n      border: {border}\n")
 }
 
 fn suspect_line(suspect: &Suspect) -> String {

@@ -2,7 +2,7 @@
 
 use darn_budget::Budget;
 use darn_contract::port::HolesQuery;
-use darn_contract::{Border, Constraints, HoleSelector, v1};
+use darn_contract::{Border, Constraints, HoleSelector, TornEdge, v1};
 use darn_geometry::mesh::loops::LoopKind;
 use darn_geometry::mesh::shapes::sheet;
 use darn_geometry::mesh::weld::weld;
@@ -114,6 +114,123 @@ fn a_border_without_a_bite_is_refused_at_its_place() {
     for (border, told) in [(Border::Auto, "no bite"), (same, "same vertex")] {
         let error = mended(&whole, &asking(border)).unwrap_err();
         assert_eq!(error.fields()[0].pointer, "/holes/0/border");
+        assert!(error.to_string().contains(told), "{error}");
+    }
+}
+
+/// A sheet torn in two along v, across a ragged gap, folded along v; `turned` shows the right piece from its other side.
+fn torn_in_two(fold: f64, turned: Turned) -> TriMesh {
+    let gap = |u: f64, v: f64| (u - 0.5 - 0.015 * (23.0 * v).sin()).abs() > 0.06;
+    let mut mesh = torn(gap, fold);
+    let is_right = |v: u32| mesh.positions[v as usize].x > 0.5;
+    if turned == Turned::Right {
+        for face in &mut mesh.faces {
+            if is_right(face[0]) {
+                face.swap(1, 2);
+            }
+        }
+    }
+    mesh
+}
+
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Turned {
+    None,
+    Right,
+}
+
+#[test]
+fn cloth_torn_in_two_is_joined_by_its_candidate() {
+    for (fold, turned) in [
+        (0.0, Turned::None),
+        (0.04, Turned::None),
+        (0.04, Turned::Right),
+    ] {
+        let mesh = torn_in_two(fold, turned);
+        let bytes = packed(&mesh, &[]);
+        let told = candidates(&bytes);
+        let [tear] = &told[..] else {
+            panic!("{turned:?}, fold {fold}: {told:?}");
+        };
+        assert!((0.9..1.3).contains(&tear.length), "{tear:?}");
+        assert!((0.08..0.16).contains(&tear.mouth), "{tear:?}");
+        assert!(tear.facing_loop.is_some_and(|other| other != tear.r#loop));
+        let message = v1::Constraints {
+            holes: vec![v1::HoleSelector {
+                border: tear.border.clone(),
+                ..Default::default()
+            }],
+            ..Default::default()
+        };
+        let named = Constraints::check(&message).expect("a tear that can be sent");
+        let answer = mended(&bytes, &named).unwrap();
+        assert_eq!(answer.report.holes.len(), 1, "{:?}", answer.report);
+        let notes = &answer.report.holes[0].notes;
+        assert!(
+            answer
+                .report
+                .notes
+                .iter()
+                .chain(notes)
+                .any(|n| n.contains("torn edges")),
+            "{:?}",
+            answer.report
+        );
+        let share = share_mended(&answer.bytes, &mesh, fold);
+        assert!(
+            (0.93..1.07).contains(&share),
+            "{turned:?}, fold {fold}: {share}"
+        );
+        assert_eq!(MendedScan::of(&answer.bytes).loops.len(), 1);
+        for p in MendedScan::of(&answer.bytes).new_positions() {
+            let off = p.z - fold * (9.0 * p.x).sin();
+            assert!(off.abs() < 0.025, "{turned:?}, fold {fold}: {p:?}");
+            assert!(
+                (-0.03..1.03).contains(&p.y),
+                "{turned:?}, fold {fold}: {p:?}"
+            );
+        }
+        let before = read(&bytes).surface.faces;
+        assert!(read(&answer.bytes).surface.faces.starts_with(&before));
+    }
+}
+
+#[test]
+fn pieces_that_do_not_face_each_other_are_no_tear() {
+    // One above the other, and side by side at a right angle.
+    let beside = |place: &dyn Fn(Vec3) -> Vec3| {
+        let mut both = torn(|u, _| u < 0.5, 0.0);
+        let count = both.positions.len() as u32;
+        let other = torn(|u, _| u < 0.5, 0.0);
+        both.positions
+            .extend(other.positions.iter().map(|p| place(*p)));
+        both.faces
+            .extend(other.faces.iter().map(|f| f.map(|v| v + count)));
+        candidates(&packed(&both, &[]))
+    };
+    let above = beside(&|p| p + Vec3::new(0.0, 0.0, 0.05));
+    assert!(above.is_empty(), "{above:?}");
+    let corner = beside(&|p| Vec3::new(0.55, p.y, p.x));
+    assert!(corner.is_empty(), "{corner:?}");
+    let far = beside(&|p| Vec3::new(1.5 - p.x, 1.0 - p.y, 0.0));
+    assert!(far.is_empty(), "{far:?}");
+}
+
+#[test]
+fn a_tear_that_cannot_be_joined_is_refused_at_its_place() {
+    let bytes = packed(&torn_in_two(0.0, Turned::None), &[]);
+    let tear = |first: [[f64; 3]; 2], second: [[f64; 3]; 2]| {
+        let edge = |[from, to]: [[f64; 3]; 2]| TornEdge { from, to };
+        Border::Tear([edge(first), edge(second)])
+    };
+    let left = [[0.44, 1.0, 0.0], [0.44, 0.0, 0.0]];
+    for (border, told) in [
+        (tear(left, [[0.6, 0.5, 0.0]; 2]), "in `facing`"),
+        (tear(left, left), "overlaps"),
+        (tear([[0.4, 0.5, 0.0]; 2], left), "same vertex"),
+    ] {
+        let error = mended(&bytes, &asking(border)).unwrap_err();
+        assert_eq!(error.fields()[0].pointer, "/holes/0/border", "{error}");
         assert!(error.to_string().contains(told), "{error}");
     }
 }

@@ -529,7 +529,7 @@ export interface components {
             /** @description A stretch of the cloth's own edge, such as a bite or a rip, to mend up to a new hem. In JSON, `"auto"` may stand for `{"auto": true}`. */
             border?: components["schemas"]["Border"];
         };
-        /** @description A stretch of the cloth's own edge: the shorter way from `from` to `to`; or, with `auto` alone, every bite and rip that is found. */
+        /** @description A stretch of the cloth's own edge: the shorter way from `from` to `to`; where the cloth is torn in two, with the edge that faces it; or, with `auto` alone, every bite and rip that is found. */
         Border: {
             /** @description Whether every bite and rip that is found is mended. */
             auto?: boolean;
@@ -539,6 +539,15 @@ export interface components {
             to?: number[];
             /** @description Points `[x, y, z]` that the new hem goes through, from `from` to `to`; left out, it continues the hem on both sides smoothly. */
             along?: number[][];
+            /** @description The torn edge that faces the stretch, of another piece of the cloth or of the same: the cloth between the two is made new, and both hems go on from the one to the other. Without `along`. */
+            facing?: components["schemas"]["TornEdge"];
+        };
+        /** @description The edge of a tear: the shorter way along the cloth's own edge from one place to another. */
+        TornEdge: {
+            /** @description Where it starts, `[x, y, z]`: the nearest vertex of the cloth's own edge. */
+            from?: number[];
+            /** @description Where it ends, `[x, y, z]`: the nearest vertex of the same loop. */
+            to?: number[];
         };
         /** @description Cloth to cut out, by exactly one of a ball (`center`, `radius`), a polygon (`polygon`, `depth`) and `loops`. Of several layers in a ball or under a polygon, those nearest to its centre or its corners are cut, and loose pieces that lie in it whole; the others are left. The triangles leave the index lists of the scan's primitives; the bytes of the old lists stay, and `extras.darn.cuts` of each primitive says how to put them back. */
         Cut: {
@@ -725,7 +734,7 @@ export interface components {
             timings?: components["schemas"]["ScanTimings"];
             /** @description What was not taken as the file has it, by kind; the file itself keeps it. */
             setAside?: components["schemas"]["SetAside"][];
-            /** @description Bites and rips at the cloth's own edge, in order of their loops. They are mended only when a request's `border` says so. */
+            /** @description Bites and rips at the cloth's own edge, in order of their loops, then pairs of torn edges that face each other. They are mended only when a request's `border` says so; `"auto"` mends bites and rips only. */
             candidates?: components["schemas"]["BorderCandidate"][];
             /** @description What a mesher has probably sealed, the largest first; only when it was asked for. */
             suspects?: components["schemas"]["Suspect"][];
@@ -737,18 +746,20 @@ export interface components {
             /** @description How many there are. */
             count?: number;
         };
-        /** @description A bite or a rip: a stretch of the cloth's own edge that leads into the cloth, between hems that continue each other. */
+        /** @description A bite or a rip: a stretch of the cloth's own edge that leads into the cloth, between hems that continue each other. Or one of two torn edges of different pieces that face each other across a gap; then `border` has `facing`. */
         BorderCandidate: {
             /** @description The loop that it is part of. */
             loop?: number;
             /** @description Length of the stretch, in the scene's unit. */
             length?: number;
-            /** @description Distance of its ends on the cloth laid flat, in the scene's unit. */
+            /** @description Distance of its ends on the cloth laid flat, in the scene's unit; of a torn edge the mean distance to the edge that faces it. */
             mouth?: number;
-            /** @description How far it leads into the cloth laid flat, in the scene's unit. */
+            /** @description How far it leads into the cloth laid flat, in the scene's unit; 0 for a torn edge. */
             depth?: number;
             /** @description The stretch: `{"holes": [{"border": this}]}` mends it. */
             border?: components["schemas"]["Border"];
+            /** @description The loop of the torn edge that faces it. */
+            facingLoop?: number;
         };
         /** @description A patch of triangles far larger than those around it: probably a hole that a mesher sealed. */
         Suspect: {

@@ -11,7 +11,7 @@ mod selector;
 
 pub use choices::{Fill, LAST_ALTERNATIVE, TextureChoice};
 pub(super) use selector::list;
-pub use selector::{Border, Cut, HoleSelector};
+pub use selector::{Border, Cut, HoleSelector, TornEdge};
 
 /// Most entries of one list of constraints: far above any use, and cheap to check.
 const MAX_ENTRIES: usize = 4096;

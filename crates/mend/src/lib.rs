@@ -33,6 +33,7 @@ mod error;
 mod fair_hole;
 mod fill_hole;
 mod formed_scan;
+mod hem_strip;
 mod hole;
 mod hole_report;
 mod inpainter;
@@ -59,6 +60,7 @@ mod session_description;
 mod sorted;
 mod strip;
 mod suspects;
+mod tears;
 #[cfg(test)]
 mod testing;
 mod texture;

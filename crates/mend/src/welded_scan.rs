@@ -7,7 +7,6 @@ use darn_budget::{Budget, Exhausted};
 use crate::cut::CutLoops;
 use crate::timings::milliseconds;
 use darn_contract::{excerpt, v1};
-use darn_geometry::mesh::TriMesh;
 use darn_geometry::mesh::blocks::FaceBlocks;
 use darn_geometry::mesh::index::FaceId;
 use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind, boundary_loops};
@@ -16,6 +15,7 @@ use darn_geometry::mesh::region::BoundedMesh;
 use darn_geometry::mesh::skins::{SecondSkin, second_skins};
 use darn_geometry::mesh::topology::Topology;
 use darn_geometry::mesh::weld::{WeldedMesh, weld_within};
+use darn_geometry::mesh::{TriMesh, Vec3};
 use darn_gltf_scan::Scan;
 
 /// The welded surface of a scan and its loops.
@@ -131,6 +131,20 @@ impl WeldedScan {
             topology: &self.topology,
             loops: &self.loops,
         }
+    }
+
+    /// The place of a loop's vertex, counted on around the loop, scene space.
+    pub fn rim_position(&self, rim: &BoundaryLoop, k: usize) -> Vec3 {
+        self.surface.mesh.positions[rim.vertices[k % rim.vertices.len()].index()]
+    }
+
+    /// The unit direction out of the cloth at an edge of a loop, in the plane of the triangle there; zero where that has no area.
+    pub fn outward(&self, rim: &BoundaryLoop, k: usize) -> Vec3 {
+        let along = self.rim_position(rim, k + 1) - self.rim_position(rim, k);
+        let face = rim.half_edges[k % rim.half_edges.len()].face();
+        let [a, b, c] = self.surface.mesh.triangle(face.index());
+        let outward = along.cross(&(b - a).cross(&(c - a)));
+        outward.try_normalize(f64::MIN_POSITIVE).unwrap_or_default()
     }
 
     /// The scan's face that a welded face was made of; none for those behind its surface.

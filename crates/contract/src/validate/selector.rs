@@ -30,6 +30,17 @@ pub enum Border {
         /// Points that the new hem goes through; none has it continue the hem on both sides.
         along: Vec<[f64; 3]>,
     },
+    /// What lies between two torn edges that face each other.
+    Tear([TornEdge; 2]),
+}
+
+/// The edge of a tear: the shorter way along the cloth's own edge from one place to another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TornEdge {
+    /// Near where it starts.
+    pub from: [f64; 3],
+    /// Near where it ends.
+    pub to: [f64; 3],
 }
 
 /// Cloth to cut out; points and lengths in scene space, in the scene's unit.
@@ -146,10 +157,11 @@ impl FieldErrors {
     fn border(&mut self, at: &str, border: &v1::Border) -> Option<Border> {
         let given = [border.from.len(), border.to.len(), border.along.len()];
         if border.auto {
-            if given == [0; 3] {
+            if given == [0; 3] && border.facing.is_none() {
                 return Some(Border::Auto);
             }
-            self.push(at, "`auto` stands alone, without `from`, `to` and `along`");
+            let detail = "`auto` stands alone, without `from`, `to`, `along` and `facing`";
+            self.push(at, detail);
             return None;
         }
         let from = self.point(&format!("{at}/from"), &border.from);
@@ -162,11 +174,30 @@ impl FieldErrors {
         let along: Vec<[f64; 3]> = (border.along.iter().enumerate())
             .filter_map(|(i, point)| self.point(&format!("{at}/along/{i}"), &numbers(point)))
             .collect();
-        (along.len() == border.along.len()).then_some(Border::Line {
-            from: from?,
-            to: to?,
-            along,
-        })
+        let Some(facing) = &border.facing else {
+            return (along.len() == border.along.len()).then_some(Border::Line {
+                from: from?,
+                to: to?,
+                along,
+            });
+        };
+        if !border.along.is_empty() {
+            let detail = "stands without `facing`: between two torn edges both hems go on smoothly";
+            self.push(&format!("{at}/along"), detail);
+        }
+        let facing_from = self.point(&format!("{at}/facing/from"), &facing.from);
+        let facing_to = self.point(&format!("{at}/facing/to"), &facing.to);
+        let edges = [
+            TornEdge {
+                from: from?,
+                to: to?,
+            },
+            TornEdge {
+                from: facing_from?,
+                to: facing_to?,
+            },
+        ];
+        border.along.is_empty().then_some(Border::Tear(edges))
     }
 
     /// A closed polygon that has a mean normal.
@@ -279,6 +310,19 @@ mod tests {
                 r#"{"border": {"from": [0, 0, 0], "to": [1, 0, 0], "along": [[0.5, 1, 0]]}}"#,
                 line(&[[0.5, 1.0, 0.0]]),
             ),
+            (
+                r#"{"border": {"from": [0, 0, 0], "to": [1, 0, 0], "facing": {"from": [1, 1, 0], "to": [0, 1, 0]}}}"#,
+                Border::Tear([
+                    TornEdge {
+                        from: [0.0; 3],
+                        to: [1.0, 0.0, 0.0],
+                    },
+                    TornEdge {
+                        from: [1.0, 1.0, 0.0],
+                        to: [0.0, 1.0, 0.0],
+                    },
+                ]),
+            ),
         ] {
             assert_eq!(
                 check(text),
@@ -298,6 +342,19 @@ mod tests {
                 "/holes/0/border/along/1",
             ),
             (r#"{"border": "auto", "id": 1}"#, "/holes/0"),
+            (
+                r#"{"border": {"auto": true, "facing": {"from": [0, 0, 0], "to": [1, 0, 0]}}}"#,
+                "/holes/0/border",
+            ),
+            (
+                r#"{"border": {"from": [0, 0, 0], "to": [1, 0, 0], "facing": {"from": [0, 0, 0]}}}"#,
+                "/holes/0/border/facing/to",
+            ),
+            (
+                r#"{"border": {"from": [0, 0, 0], "to": [1, 0, 0], "along": [[0, 0, 0]],
+                    "facing": {"from": [0, 0, 0], "to": [1, 0, 0]}}}"#,
+                "/holes/0/border/along",
+            ),
         ] {
             let wrong = check(text).expect_err(text);
             assert_eq!(wrong[0].pointer, at, "{text}");
