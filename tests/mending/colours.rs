@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use darn_contract::{Constraints, TextureChoice, v1};
+use darn_contract::{Constraints, HoleSelector, TextureChoice, v1};
 use darn_geometry::mesh::Vec3;
 use darn_texture::testset::{Fabric, Layout, TestScan};
 use serde_json::{Value, json};
 
 use super::cloth::{mended, mender, read};
 use super::patched::{
-    BEND, Patched, chunks, data_uri, edited, fabric, png, push, unbent, with_texture,
+    BEND, Patched, chunks, data_uri, edited, fabric, fabric_at, png, push, unbent, with_texture,
 };
 
 fn patched(bytes: &[u8], texture: Option<TextureChoice>) -> Patched {
@@ -50,6 +50,17 @@ fn the_patches_of_a_session_come_in_their_own_colours() {
     };
     let share = shown.share_right(&sheet);
     assert!(share > 0.9, "{share}");
+    for texture in [TextureChoice::Flat, TextureChoice::None] {
+        let asked = with_texture(Some(texture));
+        let (glb, report) = session.call(never).glb(&asked).expect("a patch");
+        let (json, _) = chunks(&glb);
+        let index = &json["meshes"][0]["primitives"][0]["material"];
+        let own = &json["materials"][index.as_u64().expect("a material") as usize];
+        let (key, done) = ("pbrMetallicRoughness", mended(&fabric(&sheet), &asked));
+        let in_file = Patched::of(&done.expect("one hole"));
+        assert_eq!(own[key], in_file.material(None)[key]);
+        assert_eq!(report.holes[0].texture.as_ref(), Some(&in_file.report));
+    }
     let whole = session.call(never).mended(&opening).expect("a scan").bytes;
     assert!(whole == mended(&fabric(&sheet), &opening).expect("one hole").bytes);
 }
@@ -66,6 +77,44 @@ fn where_the_map_goes_on_the_patch_continues_it_and_no_image_is_added() {
     let forced = patched(&fabric(&sheet), Some(TextureChoice::Synthesize));
     assert_eq!(forced.report.method, "synthesized");
     assert!(forced.share_right(&sheet) > 0.9);
+}
+
+#[test]
+fn the_end_of_a_tube_is_closed_in_the_colours_of_its_cloth() {
+    for kind in [Fabric::Stripes, Fabric::Print] {
+        let sheet = TestScan::new(kind, Layout::Atlas, 128);
+        // The rim of the hole is the end of a tube, a sock's without its toe.
+        let bytes = fabric_at(&sheet, |[x, y]| {
+            let (away, angle) = (x.hypot(y), y.atan2(x));
+            Vec3::new(0.64 * angle.cos(), 0.64 * angle.sin(), 0.64 - away / 100.0)
+        });
+        let places = (0..4096).map(|k| [k % 64, k / 64].map(|c| f64::from(4 * c) - 128.0));
+        let fabric: Vec<[f32; 3]> = places.map(|p| sheet.truth(p)).collect();
+        let is_of_it = |colour: [u8; 3]| {
+            let colour = colour.map(|c| f32::from(c) / 255.0);
+            let off = |c: &[f32; 3]| (0..3).map(|k| (c[k] - colour[k]).abs()).fold(0.0, f32::max);
+            fabric.iter().any(|known| off(known) < 0.1)
+        };
+        let mut shares = Vec::new();
+        for texture in [None, Some(TextureChoice::Continue)] {
+            let asked = Constraints {
+                holes: vec![HoleSelector::Near([0.0, 0.0, 0.3])],
+                ..with_texture(texture)
+            };
+            let done = mended(&bytes, &asked).expect("one end");
+            assert!(done.report.holes[0].chart.is_none(), "{}", kind.name());
+            let own = Patched::of(&done);
+            if texture.is_none() {
+                assert_eq!(own.report.method, "synthesized", "{}", own.report.reason);
+            }
+            let shown = own.shown(None);
+            let right = shown.iter().filter(|(_, colour)| is_of_it(*colour)).count();
+            shares.push(right as f64 / shown.len() as f64);
+        }
+        // Threads of the weave are mixed where the chart is stretched.
+        assert!(shares[0] > 0.9, "{}: {shares:?}", kind.name());
+        assert!(shares[1] < 0.5, "{}: {shares:?}", kind.name());
+    }
 }
 
 #[test]

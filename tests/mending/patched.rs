@@ -78,7 +78,12 @@ pub fn edited(glb: &[u8], edit: impl FnOnce(&mut Value)) -> Vec<u8> {
 
 /// A sheet of a fabric as a file: bent, with its image as base colour.
 pub fn fabric(sheet: &TestScan) -> Vec<u8> {
-    let positions = sheet.mesh.positions.iter().map(|p| bent([p.x, p.y]));
+    fabric_at(sheet, bent)
+}
+
+/// The same with the flat sheet's points at other places.
+pub fn fabric_at(sheet: &TestScan, place: impl Fn([f64; 2]) -> Vec3) -> Vec<u8> {
+    let positions = sheet.mesh.positions.iter().map(|p| place([p.x, p.y]));
     let mesh = TriMesh {
         positions: positions.collect(),
         faces: sheet.mesh.faces.clone(),

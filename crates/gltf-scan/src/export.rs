@@ -38,27 +38,38 @@ pub fn glb(mesh: &NewMesh) -> Result<Vec<u8>, ScanError> {
 /// # Errors
 /// [`ScanError::InvalidPatch`] when the file would exceed the 4 GiB of a GLB.
 pub fn meshes(meshes: &[NewMesh]) -> Result<Vec<u8>, ScanError> {
-    let plain = meshes.iter().map(|mesh| TexturedMesh {
+    let plain = meshes.iter().map(|mesh| ColouredMesh {
         mesh: *mesh,
-        texture: None,
+        look: MeshLook::Cloth,
     });
-    textured_meshes(&plain.collect::<Vec<_>>())
+    coloured_meshes(&plain.collect::<Vec<_>>())
 }
 
-/// A mesh to write, in the base colour of images of its own if it has them; its texture coordinates lie in them.
-#[derive(Debug, Clone, Copy)]
-pub struct TexturedMesh<'a> {
+/// A mesh to write, and its colour.
+#[derive(Debug, Clone)]
+pub struct ColouredMesh<'a> {
     /// The mesh.
     pub mesh: NewMesh<'a>,
-    /// The images.
-    pub texture: Option<&'a OwnTexture>,
+    /// Its colour.
+    pub look: MeshLook<'a>,
 }
 
-/// Several meshes as [`meshes`] writes them, those with a texture in a material of their own.
+/// The colour of a mesh.
+#[derive(Debug, Clone)]
+pub enum MeshLook<'a> {
+    /// The same as that of all others.
+    Cloth,
+    /// The base colour of images of its own, in which its texture coordinates lie.
+    Images(&'a OwnTexture),
+    /// The `pbrMetallicRoughness` of a material without images.
+    Plain(Value),
+}
+
+/// Several meshes as [`meshes`] writes them, those with a colour of their own in a material of their own.
 ///
 /// # Errors
 /// [`ScanError::InvalidPatch`] when the file would exceed the 4 GiB of a GLB.
-pub fn textured_meshes(meshes: &[TexturedMesh]) -> Result<Vec<u8>, ScanError> {
+pub fn coloured_meshes(meshes: &[ColouredMesh]) -> Result<Vec<u8>, ScanError> {
     let mut buffer = BufferBuilder::default();
     let mut materials = vec![json!({
         "name": "cloth",
@@ -67,22 +78,32 @@ pub fn textured_meshes(meshes: &[TexturedMesh]) -> Result<Vec<u8>, ScanError> {
     })];
     let (mut images, mut textures) = (Vec::new(), Vec::new());
     let mut primitives: Vec<Value> = Vec::new();
-    for TexturedMesh { mesh, texture } in meshes {
+    for ColouredMesh { mesh, look } in meshes {
         let mut primitive = buffer.primitive(mesh);
-        let base = texture.and_then(|own| Some((own, own.base_colour()?)));
-        if let Some((own, layer)) = base {
-            let png = ImageSheet::of(&[own]).png(layer, TextureKind::BaseColour)?;
-            images.push(json!({"bufferView": buffer.view(&png, None), "mimeType": "image/png"}));
-            textures.push(json!({"source": images.len() - 1}));
+        let pbr = match look {
+            MeshLook::Cloth => None,
+            MeshLook::Plain(pbr) => Some(pbr.clone()),
+            MeshLook::Images(own) => match own.base_colour() {
+                Some(layer) => {
+                    let png = ImageSheet::of(&[own]).png(layer, TextureKind::BaseColour)?;
+                    let view = buffer.view(&png, None);
+                    images.push(json!({"bufferView": view, "mimeType": "image/png"}));
+                    textures.push(json!({"source": images.len() - 1}));
+                    Some(json!({
+                        "baseColorTexture": {"index": textures.len() - 1},
+                        "metallicFactor": 0.0,
+                        "roughnessFactor": 0.9,
+                    }))
+                }
+                None => None,
+            },
+        };
+        if let Some(pbr) = pbr {
             primitive["material"] = materials.len().into();
             materials.push(json!({
                 "name": "darn reconstruction",
                 "doubleSided": true,
-                "pbrMetallicRoughness": {
-                    "baseColorTexture": {"index": textures.len() - 1},
-                    "metallicFactor": 0.0,
-                    "roughnessFactor": 0.9,
-                },
+                "pbrMetallicRoughness": pbr,
             }));
         }
         primitives.push(primitive);

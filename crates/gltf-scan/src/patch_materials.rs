@@ -10,9 +10,10 @@ use serde_json::{Map, Value, json};
 
 use super::append::Appender;
 use super::error::ScanError;
+use super::export::MeshLook;
 use super::hatch;
-use super::patch_appearance::{MaterialStyle, StyleKind};
-use super::patch_primitive::is_reconstructed;
+use super::patch_appearance::{MaterialStyle, PatchAppearance, StyleKind};
+use super::patch_primitive::{PatchPrimitive, is_reconstructed};
 use super::scan::Scan;
 use super::variants::{MaterialChoices, PatchMaterials};
 use super::xmp;
@@ -118,7 +119,7 @@ impl<'s> PatchMaterialsMaker<'s> {
         if let Some(known) = self.blended.get(&key) {
             return Ok(*known);
         }
-        let mut copy = self.source(source)?;
+        let mut copy = copy_of(self.scan, source)?;
         let own = is_reconstructed(copy.get("extras"));
         let made = match (source, own && is_continued) {
             (Some(source), true) => source,
@@ -147,7 +148,7 @@ impl<'s> PatchMaterialsMaker<'s> {
         if let Some(known) = self.marked.get(&(key, hatch)) {
             return Ok(*known);
         }
-        let mut copy = self.source(source)?;
+        let mut copy = copy_of(self.scan, source)?;
         request.style.apply(&mut copy, None);
         let name = format!("{RECONSTRUCTION}, marked");
         mark(&mut copy, &name, &["reconstructed", "marked"]);
@@ -206,19 +207,44 @@ impl<'s> PatchMaterialsMaker<'s> {
             out.push("textures", json!({ "name": "darn hatch", "source": image }))
         })
     }
+}
 
-    /// A copy of a material of the scan; without one, glTF's default.
-    fn source(&self, source: Option<usize>) -> Result<Map<String, Value>, ScanError> {
-        let Some(source) = source else {
-            return Ok(Map::new());
+impl Scan {
+    /// How a patch looks beside the scan, without a variant and in its base colour alone; as all others do where it continues the scan.
+    ///
+    /// # Errors
+    /// [`ScanError::Invalid`] for a material of the scan that is missing or no object.
+    pub fn mesh_look<'p>(&self, patch: &'p PatchPrimitive) -> Result<MeshLook<'p>, ScanError> {
+        let kind = match &patch.appearance {
+            PatchAppearance::Continued => return Ok(MeshLook::Cloth),
+            PatchAppearance::Own(own) => return Ok(MeshLook::Images(own)),
+            PatchAppearance::Flat(look, means) => StyleKind::Flat(look, means),
+            PatchAppearance::Plain => StyleKind::Plain,
         };
-        let pointer = format!("/materials/{source}");
-        let material = self.scan.json.pointer(&pointer).and_then(Value::as_object);
-        material.cloned().ok_or_else(|| ScanError::Invalid {
-            pointer,
-            detail: "must be an object".into(),
-        })
+        let cloth = self.parts.get(patch.material_of);
+        let mut material = copy_of(self, cloth.and_then(|part| part.material))?;
+        MaterialStyle { number: 0, kind }.apply(&mut material, None);
+        let mut pbr = match material.remove("pbrMetallicRoughness") {
+            Some(Value::Object(pbr)) => pbr,
+            _ => Map::new(),
+        };
+        // Beside the scan there are none of its textures.
+        pbr.retain(|key, _| !key.ends_with("Texture"));
+        Ok(MeshLook::Plain(Value::Object(pbr)))
     }
+}
+
+/// A copy of a material of the scan; without one, glTF's default.
+fn copy_of(scan: &Scan, source: Option<usize>) -> Result<Map<String, Value>, ScanError> {
+    let Some(source) = source else {
+        return Ok(Map::new());
+    };
+    let pointer = format!("/materials/{source}");
+    let material = scan.json.pointer(&pointer).and_then(Value::as_object);
+    material.cloned().ok_or_else(|| ScanError::Invalid {
+        pointer,
+        detail: "must be an object".into(),
+    })
 }
 
 /// Names a material after what it is, and sets flags in `extras.darn`. Extras that are not an object cannot take them; the

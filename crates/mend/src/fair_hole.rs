@@ -8,6 +8,7 @@ use crate::fill_hole::PatchDraft;
 use crate::mender::Call;
 use crate::prepared_hole::HoleRef;
 use crate::select::HoleRequest;
+use crate::texture::HoleTextures;
 use crate::timings::milliseconds;
 use crate::welded_scan::WeldedScan;
 use darn_contract::{FieldError, v1};
@@ -31,6 +32,8 @@ pub struct FairHole {
     pub timings: v1::HoleTimings,
     /// Whether the surface continues the cloth without the scanner's noise.
     pub denoised: bool,
+    /// The textures of its patch made so far.
+    pub textures: HoleTextures,
 }
 
 impl FairHole {
@@ -82,6 +85,7 @@ impl FairHole {
             region,
             fair,
             reason,
+            textures: HoleTextures::default(),
         };
         budget.hold(hole.bytes())?;
         Ok(hole)
@@ -127,5 +131,6 @@ impl FairHole {
             + 16 * self.region.mesh.faces.len()
             + 4 * self.region.vertices.len()
             + self.fair.bytes()
+            + self.textures.bytes()
     }
 }

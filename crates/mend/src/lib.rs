@@ -38,6 +38,7 @@ mod hole;
 mod hole_report;
 mod inpainter;
 mod islands;
+mod laid_cloth;
 mod limits;
 mod mender;
 mod moved_fill;

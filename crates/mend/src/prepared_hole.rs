@@ -9,6 +9,7 @@ use crate::hole::Hole;
 use crate::inpainter::Inpainter;
 use crate::mender::Call;
 use crate::prepare::prepare_hole;
+use crate::texture::HoleTextures;
 use crate::welded_scan::WeldedScan;
 use darn_geometry::mesh::TriMesh;
 use darn_geometry::mesh::region::{Region, RegionError};
@@ -122,6 +123,14 @@ impl<'a> HoleRef<'a> {
         match self {
             HoleRef::Charted(hole) => &hole.region,
             HoleRef::Fair(hole) => &hole.region,
+        }
+    }
+
+    /// The textures of its patch made so far.
+    pub fn textures(self) -> &'a HoleTextures {
+        match self {
+            HoleRef::Charted(hole) => &hole.textures,
+            HoleRef::Fair(hole) => &hole.textures,
         }
     }
 

@@ -357,11 +357,11 @@ impl ScanHoles {
         additions.written(scan, cut.as_ref().unwrap_or(scan), call)
     }
 
-    /// What the filled holes add to the scan.
+    /// What the filled holes add to the scan, coloured as asked for, and the report.
     ///
     /// # Errors
     /// `Exhausted`.
-    fn additions(
+    pub fn additions(
         &self,
         scan: &Scan,
         mut filled: FilledScan,
@@ -393,7 +393,7 @@ impl ScanHoles {
     ///
     /// # Errors
     /// `Exhausted`.
-    pub fn coloured(
+    fn coloured(
         &self,
         scan: &Scan,
         filled: &FilledScan,

@@ -9,13 +9,14 @@ use crate::call_pools::CallPools;
 use crate::error::MendError;
 use crate::mender::{Call, NetworkMender};
 use crate::prepared_hole::PreparedHole;
+use crate::scan_additions::ScanAdditions;
 use crate::scan_holes::{FilledScan, ScanHoles};
 use crate::session_description;
 use darn_budget::Budget;
 use darn_contract::port::{MapSpan, Mended};
 use darn_contract::{Constraints, FieldError, Search, v1};
 use darn_geometry::mesh::Vec3;
-use darn_gltf_scan::export::{NewMesh, TexturedMesh, textured_meshes};
+use darn_gltf_scan::export::{ColouredMesh, MeshLook, NewMesh, coloured_meshes};
 use darn_gltf_scan::{PatchPoint, PatchPrimitive, Scan};
 
 /// A scan with its holes prepared, the mender that fills them, and the description of both.
@@ -151,21 +152,24 @@ impl<'a> SessionCall<'a> {
         Ok(mended)
     }
 
-    /// The patches alone, as a GLB with one mesh for each hole, in order of id, each in the base colour of its own images if it has them.
+    /// The patches alone, as a GLB with one mesh for each hole, in order of id, each in the base colour of its own images, or in its one
+    /// colour; and the report, which says where the colours come from.
     ///
     /// # Errors
     /// As [`mend`](crate::mend).
     pub fn glb(&self, constraints: &Constraints) -> Result<(Vec<u8>, v1::Report), MendError> {
         let filled = self.filled(constraints)?;
-        let coloured = (self.session.holes).coloured(
+        let ScanAdditions {
+            primitives,
+            mut report,
+        } = (self.session.holes).additions(
             &self.session.scan,
-            &filled,
+            filled,
             constraints.texture,
             self.call,
         )?;
-        let additions = coloured.patches.into_iter().map(|patch| patch.primitive);
-        let bytes = glb(&self.session.scan, &additions.collect::<Vec<_>>())?;
-        Ok((bytes, self.session.report(filled)))
+        self.session.remove_preparation(&mut report);
+        Ok((glb(&self.session.scan, &primitives)?, report))
     }
 
     /// The positions of the patches' vertices in scene space: one list for each hole, in order of id, each in the order
@@ -228,7 +232,7 @@ impl<'a> SessionCall<'a> {
     }
 }
 
-/// Patches as a GLB: a mesh for each, in scene space, with its first texture coordinates and its own base colour.
+/// Patches as a GLB: a mesh for each, in scene space, with its first texture coordinates and its own colour, where that is not the scan's.
 fn glb(scan: &Scan, additions: &[PatchPrimitive]) -> Result<Vec<u8>, MendError> {
     let place = |point: &PatchPoint| -> [f32; 3] {
         match point {
@@ -250,8 +254,12 @@ fn glb(scan: &Scan, additions: &[PatchPrimitive]) -> Result<Vec<u8>, MendError> 
                 .collect()
         })
         .collect();
-    let fresh: Vec<TexturedMesh> = (additions.iter().zip(positions.iter().zip(&normals)))
-        .map(|(addition, (positions, normals))| TexturedMesh {
+    let looks: Vec<MeshLook> = (additions.iter())
+        .map(|addition| scan.mesh_look(addition))
+        .collect::<Result<_, _>>()?;
+    let fresh: Vec<ColouredMesh> = (additions.iter().zip(looks))
+        .zip(positions.iter().zip(&normals))
+        .map(|((addition, look), (positions, normals))| ColouredMesh {
             mesh: NewMesh {
                 name: &addition.name,
                 positions,
@@ -259,10 +267,10 @@ fn glb(scan: &Scan, additions: &[PatchPrimitive]) -> Result<Vec<u8>, MendError> 
                 texcoords: addition.texcoords.first().map_or(&[], Vec::as_slice),
                 faces: &addition.faces,
             },
-            texture: addition.appearance.own(),
+            look,
         })
         .collect();
-    Ok(textured_meshes(&fresh)?)
+    Ok(coloured_meshes(&fresh)?)
 }
 
 #[cfg(test)]

@@ -17,14 +17,16 @@ use rayon::prelude::*;
 
 use crate::addition::{DressedPatch, PatchSource};
 use crate::error::MendError;
-use crate::hole::Hole;
 use crate::hole_report::FilledHole;
+use crate::laid_cloth::LaidCloth;
+use crate::prepared_hole::HoleRef;
 use crate::texture_cloth::TextureCloth;
 use crate::texture_images::ImageCache;
 use crate::timings::milliseconds;
 
 /// Why a patch has no images of its own where the request asks for none in particular.
-const NO_CHART: &str = "the cloth around the hole has no chart to lay a texture in";
+const NO_CHART: &str =
+    "the cloth around the hole and its patch cannot be laid flat together to lay a texture in";
 
 /// A patch as it goes to the scan, and what its report says.
 pub struct ColouredPatch {
@@ -114,7 +116,7 @@ const LAID_AT_ONCE: usize = 64;
 struct TextureTask<'t> {
     /// Index among the filled holes.
     index: usize,
-    hole: &'t Hole,
+    hole: HoleRef<'t>,
     look: Arc<ClothLook>,
 }
 
@@ -143,22 +145,23 @@ impl Colouring<'_> {
         let tasks = self.tasks(filled, &dressed, &mut images)?;
         for tasks in tasks.chunks(LAID_AT_ONCE) {
             let laid = tasks.par_iter().map(|task| {
-                let started = Instant::now();
-                let laid = TextureCloth::of(
-                    task.hole,
-                    &dressed[task.index],
-                    self.source.scan,
-                    &task.look,
-                    &images.decoded,
-                );
-                LaidTask {
+                let (started, dressed) = (Instant::now(), &dressed[task.index]);
+                let Some(laid) = LaidCloth::of(task.hole, dressed, &self.source)? else {
+                    let texture = continued(self.why(NO_CHART));
+                    task.hole.textures().keep(self.choice, texture);
+                    return Ok(None);
+                };
+                let (scan, look) = (self.source.scan, &task.look);
+                let laid = TextureCloth::of(&laid, dressed, scan, look, &images.decoded);
+                Ok(Some(LaidTask {
                     task: task.clone(),
                     bytes: estimated_bytes(&laid.cloth, &laid.patch, &self.settings),
                     laid,
                     laid_ms: milliseconds(started),
-                }
+                }))
             });
-            self.complete(laid.collect(), &mut times)?;
+            let laid: Vec<Option<LaidTask>> = laid.collect::<Result<_, MendError>>()?;
+            self.complete(laid.into_iter().flatten().collect(), &mut times)?;
         }
         images.release(self.source.budget);
         let all = filled.par_iter().zip(dressed).zip(times);
@@ -186,13 +189,13 @@ impl Colouring<'_> {
             return Ok(tasks);
         }
         for (index, (filled, dressed)) in filled.iter().zip(dressed).enumerate() {
-            let hole = filled.hole.charted();
-            let Some(hole) = hole.filter(|hole| hole.textures.get(self.choice).is_none()) else {
+            let hole = filled.hole;
+            if hole.textures().get(self.choice).is_some() {
                 continue;
-            };
+            }
             match self.look(dressed, images)? {
                 Ok(look) => tasks.push(TextureTask { index, hole, look }),
-                Err(without) => hole.textures.keep(self.choice, without),
+                Err(without) => hole.textures().keep(self.choice, without),
             }
         }
         Ok(tasks)
@@ -243,7 +246,7 @@ impl Colouring<'_> {
             Err(TextureError::Exhausted(exhausted)) => return Err(exhausted.into()),
             Err(reason) => continued(reason.to_string()),
         };
-        task.hole.textures.keep(self.choice, texture);
+        task.hole.textures().keep(self.choice, texture);
         Ok(())
     }
 
@@ -260,8 +263,7 @@ impl Colouring<'_> {
             let report = report_of("none", String::new());
             return (with(plain, PatchAppearance::Plain), report);
         }
-        let kept = (filled.hole.charted()).and_then(|hole| hole.textures.get(self.choice));
-        let Some(texture) = kept else {
+        let Some(texture) = filled.hole.textures().get(self.choice) else {
             return (
                 dressed.primitive,
                 report_of("continued", self.why(NO_CHART)),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::addition::DressedPatch;
-use crate::hole::Hole;
+use crate::laid_cloth::LaidCloth;
 use darn_geometry::mesh::Vec2;
 use darn_gltf_scan::{ClothLook, DecodedImage, Scan, ScanPart, TextureKind, TextureWrap};
 use darn_texture::{
@@ -37,7 +37,7 @@ struct PlacedSet {
 impl<'i> TextureCloth<'i> {
     /// Lays out a hole's cloth. Faces whose corners belong to several parts are left out.
     pub fn of(
-        hole: &Hole,
+        laid: &LaidCloth,
         dressed: &DressedPatch,
         scan: &Scan,
         look: &ClothLook,
@@ -82,10 +82,9 @@ impl<'i> TextureCloth<'i> {
             texcoords: vec![Vec::new(); sets.len()],
             ..Cloth::default()
         };
-        let region = &hole.region;
-        let parts = dressed.sources.iter().flatten().map(|source| source.part);
-        let is_coloured = parts.clone().any(|p| !scan.parts[p].colors.is_empty());
-        for (face, source) in region.mesh.faces.iter().zip(&dressed.sources) {
+        let mut parts = laid.sources.iter().flatten().map(|source| source.part);
+        let is_coloured = parts.any(|p| !scan.parts[p].colors.is_empty());
+        for (face, source) in laid.region.mesh.faces.iter().zip(&*laid.sources) {
             let Some(source) = source else { continue };
             let part = &scan.parts[source.part];
             let Some(material) = look.material_of.get(&source.part) else {
@@ -107,12 +106,11 @@ impl<'i> TextureCloth<'i> {
                 cloth.colours.push(source.corners.map(colour));
             }
         }
-        let flat = &hole.chart.flat;
-        let turn = turn(flat, &cloth);
+        let turn = turn(&laid.flat, &cloth);
         let turned = |p: &Vec2| [turn[0] * p.x + turn[1] * p.y, turn[0] * p.y - turn[1] * p.x];
-        cloth.flat = flat.iter().map(turned).collect();
+        cloth.flat = laid.flat.iter().map(turned).collect();
         let patch = PatchChart {
-            flat: dressed.patch_flat.iter().map(turned).collect(),
+            flat: laid.patch_flat.iter().map(turned).collect(),
             faces: dressed.patch_faces.to_vec(),
         };
         let continued = continued(dressed, &patch, look, &sets, is_coloured);

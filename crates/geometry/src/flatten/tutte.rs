@@ -10,7 +10,7 @@ use crate::cholesky::Symmetric;
 use crate::mesh::region::Region;
 use crate::mesh::{TriMesh, Vec2};
 
-/// Embeds a region whose rim and holes are each closed by one virtual vertex joined to all of the loop.
+/// Embeds a region whose rim, if it has one, and holes are each closed by one virtual vertex joined to all of the loop.
 ///
 /// The circle's circumference is the length of the outer loop, so the layout has about the right size.
 ///
@@ -18,7 +18,8 @@ use crate::mesh::{TriMesh, Vec2};
 /// `Singular` when the system has no solution; `Exhausted`.
 pub(super) fn embed(region: &Region, budget: &Budget) -> Result<Vec<Vec2>, FlattenError> {
     let Region { mesh, outer, .. } = region;
-    let loops: Vec<&Vec<u32>> = std::iter::once(&region.rim).chain(&region.holes).collect();
+    let loops = std::iter::once(&region.rim).chain(&region.holes);
+    let loops: Vec<&Vec<u32>> = loops.filter(|rim| !rim.is_empty()).collect();
     let count = mesh.positions.len();
     let fixed = circle(mesh, outer);
     let mut unknown = vec![usize::MAX; count + loops.len()];

@@ -3,6 +3,7 @@
 //! Stages: `span` (triangles between the rim's vertices) → `remesh` (even triangles) and `surface` (where their vertices
 //! belong) in turn, first with few vertices, then with the scan's edge length → collisions, as for other patches.
 
+mod layout;
 mod remesh;
 mod span;
 mod surface;
@@ -19,6 +20,7 @@ use super::{Patch, PatchError, PatchWork};
 use crate::mesh::layers::Layers;
 use crate::mesh::region::Region;
 use crate::mesh::{TriMesh, Vec3};
+pub use layout::FairLayout;
 use remesh::Sheet;
 use span::{SpanRim, span};
 use surface::{Bend, Fairing};

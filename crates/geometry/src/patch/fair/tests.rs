@@ -5,6 +5,7 @@ use std::f64::consts::{PI, TAU};
 use darn_budget::Budget;
 
 use super::*;
+use crate::flatten::FlattenLimits;
 use crate::mesh::index::LoopId;
 use crate::mesh::loops::{BoundaryLoop, boundary_loops};
 use crate::mesh::region::{BoundedMesh, collar};
@@ -123,4 +124,49 @@ fn the_end_of_a_tube_is_capped_smoothly() {
     let top = patch.positions.iter().map(|p| p.z).fold(0.0, f64::max);
     assert!(top > 2.2, "{top}");
     assert_eq!(patch.crossings, 0);
+}
+
+/// The layout of the largest loop's patch with the cloth that is not farther from it than `reach`.
+fn laid_out(soup: &TriMesh, reach: f64) -> Option<FairLayout> {
+    let mesh = weld(soup).mesh;
+    let topology = Topology::new(&mesh);
+    let loops = boundary_loops(&mesh, &topology);
+    let whole = BoundedMesh {
+        mesh: &mesh,
+        topology: &topology,
+        loops: &loops,
+    };
+    let chosen = |l: &&BoundaryLoop| l.centroid.z;
+    let best = loops.iter().max_by(|a, b| chosen(a).total_cmp(&chosen(b)));
+    let rim = best.expect("a loop").id;
+    let never = Budget::unlimited();
+    let narrow = collar(&whole, rim, 0.0, never).expect("a collar");
+    let patch = FairPatch::new(&narrow, &PatchOptions::default());
+    let patch = patch.expect("a patch").patch;
+    let region = collar(&whole, rim, reach, never).expect("a collar");
+    let layout = FairLayout::of(&patch, &region, &FlattenLimits::default(), never);
+    let layout = layout.expect("no limits")?;
+    assert_eq!(layout.region.len(), region.mesh.positions.len());
+    assert_eq!(layout.patch.len(), patch.positions.len());
+    let rim = region.rim.iter().rev().map(|v| layout.region[*v as usize]);
+    assert!(rim.eq(layout.patch[..patch.rim.len()].iter().copied()));
+    for face in &patch.faces {
+        let [a, b, c] = face.map(|v| layout.patch[v as usize]);
+        assert!((b - a).perp(&(c - a)) > 0.0, "a face is turned over");
+    }
+    Some(layout)
+}
+
+#[test]
+fn the_cap_of_a_sphere_is_laid_flat_with_the_cloth_around_it_as_far_as_that_goes() {
+    let gentle = laid_out(&open_sphere(48, 0.5), 0.3).expect("a layout");
+    assert!(
+        (1.0..1.1).contains(&gentle.stretch_mean),
+        "{}",
+        gentle.stretch_mean
+    );
+    let half = laid_out(&open_sphere(48, 1.0), 0.4).expect("a layout");
+    assert!(half.stretch_mean > gentle.stretch_mean);
+    // All of the sphere but its other end cannot be laid flat.
+    assert!(laid_out(&open_sphere(48, 0.5), 2.5).is_none());
 }
