@@ -82,6 +82,11 @@ export function sheetWithBite() {
   return sheetGlb(40, (i, j) => (i - 19.5) ** 2 / 16 + j ** 2 / 36 < 1);
 }
 
+/** A sheet of 40 squares torn in two: a gap of three squares, its edges ragged. */
+export function sheetTornInTwo() {
+  return sheetGlb(40, (i, j) => Math.abs(i - 19.5 - (j % 2)) < 1.6);
+}
+
 /** A sheet with one hole whose vertices have colours, as a glTF. */
 export function sheetInColours() {
   const glb = sheetGlb(30, (i, j) => Math.hypot(i - 14.5, j - 14.5) < 4.3);

@@ -5,51 +5,9 @@ import { test } from 'node:test';
 import { TEXTURED } from './shared.mjs';
 import { load } from './sources.mjs';
 
-const { headOfResult } = await load('client.ts');
 const { Editor } = await load('model/editor.ts');
 const { documentOf, hasColours, plainColours } = await load('model/gltf_document.ts');
 const { colourInWords, textureInWords } = await load('model/textures.ts');
-
-/** A GLB of a document and some bytes behind it. */
-function glbOf(document, rest) {
-  const json = Buffer.from(JSON.stringify(document));
-  const header = Buffer.alloc(20);
-  header.write('glTF');
-  header.writeUInt32LE(json.length, 12);
-  return Buffer.concat([header, json, rest]);
-}
-
-/** An answer of two parts in pieces of so many bytes; how many were taken. */
-function answerInPieces(report, scan, size) {
-  const part = (name, body) =>
-    Buffer.concat([Buffer.from(`--x\r\ncontent-disposition: attachment; name="${name}"\r\n`), lengthOf(body), body]);
-  const lengthOf = (body) => Buffer.from(`Content-Length: ${body.length}\r\n\r\n`);
-  const parts = [part('report', Buffer.from(JSON.stringify(report))), part('scan', scan), Buffer.from('--x--')];
-  const bytes = Buffer.concat(parts.flatMap((it) => [it, Buffer.from('\r\n')]));
-  const taken = { count: 0, all: bytes.length };
-  const pull = (controller) => {
-    controller.enqueue(new Uint8Array(bytes.subarray(taken.count, taken.count + size)));
-    taken.count += size;
-    if (taken.count >= bytes.length) {
-      controller.close();
-    }
-  };
-  return { answer: new Response(new ReadableStream({ pull }, { highWaterMark: 0 })), taken };
-}
-
-test('the head of a mended scan is read however it is cut, and the buffers are not fetched', async () => {
-  const report = { holes: [{ id: 1, texture: { method: 'flat' } }] };
-  const document = { materials: [{ name: 'é' }] };
-  for (const size of [1, 7, 4096]) {
-    const { answer, taken } = answerInPieces(report, glbOf(document, Buffer.alloc(100_000)), size);
-    assert.deepEqual(await headOfResult(answer), { report, document });
-    assert.ok(taken.count < 10_000, `${taken.count} of ${taken.all} bytes`);
-    const text = answerInPieces(report, Buffer.from(JSON.stringify(document)), size);
-    assert.deepEqual(await headOfResult(text.answer), { report, document });
-  }
-  const cut = new Response('--x\r\ncontent-length: 9\r\n\r\n{}');
-  await assert.rejects(headOfResult(cut), /ends before/);
-});
 
 test('a scan has colours by its images or by its vertices', () => {
   const primitive = (attributes) => ({ meshes: [{ primitives: [{ attributes }] }] });
@@ -60,19 +18,16 @@ test('a scan has colours by its images or by its vertices', () => {
   assert.equal(hasColours(documentOf(new ArrayBuffer(0))), false);
 });
 
-test('colours without images are those of the new patches, not of patches that the scan had', () => {
-  const patch = (id, material, attributes = {}) => ({
-    material,
-    attributes,
-    extras: { darn: { holes: [{ id }] } },
-  });
-  const material = (red) => ({ pbrMetallicRoughness: { baseColorFactor: [red, 0.2, 0.3, 1], metallicFactor: 0 } });
-  const materials = [material(0.1), material(0.5)];
-  const old = { primitives: [{}, patch(1, 0)] };
-  const scan = { materials, meshes: [{ primitives: [{}] }, old] };
-  const added = { primitives: [{}, patch(1, 1), patch(2, 1, { COLOR_0: 0 }), patch(3, 1)] };
-  const colours = plainColours({ materials, meshes: [added, old] }, scan, new Set([1, 2]));
-  assert.deepEqual([...colours], [[1, { color: [0.5, 0.2, 0.3], roughness: 1, metalness: 0 }]]);
+test('colours of patches are those of their own materials without images', () => {
+  const own = (look) => ({ name: 'darn reconstruction', pbrMetallicRoughness: look });
+  const materials = [
+    { name: 'cloth', pbrMetallicRoughness: { baseColorFactor: [0.1, 0.1, 0.1, 1] } },
+    own({ baseColorTexture: { index: 0 } }),
+    own({ baseColorFactor: [0.5, 0.2, 0.3, 1], metallicFactor: 0 }),
+  ];
+  const meshes = [0, 1, 2].map((material) => ({ primitives: [{ material }] }));
+  const colours = plainColours({ materials, meshes }, [3, 5, 8, 9]);
+  assert.deepEqual([...colours], [[8, { color: [0.5, 0.2, 0.3], roughness: 1, metalness: 0 }]]);
 });
 
 test('a colour is told in words, with the reason, and where it is none that was asked for', () => {
@@ -98,8 +53,7 @@ test('one colour or fill is asked for at a time, the newest of each waits, and e
     holes: async () => ({ loops: [{ id: 1, kind: 'HOLE' }] }),
     openSession: async () => ({ id: 's', holes: [{ id: 1, patchFaces: [0, 1, 2], patchUvs: [0, 0, 1, 0, 0, 1] }] }),
     positions: async () => new Float32Array(9),
-    patches: async () => new ArrayBuffer(0),
-    resultHead: async () => ({ report: { holes: [{ id: 1, texture: { method: 'flat' } }] }, document: {} }),
+    patches: async () => ({ glb: new ArrayBuffer(0), report: { holes: [{ id: 1, texture: { method: 'flat' } }] } }),
     mend: (_, constraints) =>
       new Promise((resolve) => {
         const answer = () => resolve({ positions: new Float32Array(9), report: { holes: [{ id: 1 }] } });
@@ -141,4 +95,24 @@ test('one colour or fill is asked for at a time, the newest of each waits, and e
   assert.deepEqual([editor.texture, editor.step.label], [undefined, 'Mend 1 hole']);
   editor.redo();
   assert.deepEqual([editor.texture, JSON.parse(editor.constraintsText()).texture], ['none', 'none']);
+});
+
+test('a request that was stopped may have come: the result is asked for anew', async () => {
+  const { ClothSession } = await load('client.ts');
+  const met = [];
+  const service = {
+    openSession: async () => ({ id: 's', holes: [] }),
+    mend: async (_, constraints, { signal } = {}) => {
+      met.push(constraints.texture);
+      signal?.throwIfAborted();
+      return { positions: new Float32Array(0), report: {} };
+    },
+    result: async () => met.at(-1),
+  };
+  const cloth = await ClothSession.open(service, new Blob(['scan']), {}, {});
+  await cloth.mend({ texture: 'flat' });
+  const stopped = AbortSignal.abort(new Error('stopped'));
+  await assert.rejects(cloth.mend({ texture: 'none' }, { signal: stopped }), /stopped/);
+  assert.equal(await cloth.result({ texture: 'flat' }), 'flat');
+  assert.deepEqual(met, ['flat', 'none', 'flat']);
 });

@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 import axe from 'axe-core';
 import { PATIENCE, openEditor, startBrowser, startService } from './browser.mjs';
-import { sheetWithBite } from './fixtures.mjs';
+import { sheetTornInTwo, sheetWithBite } from './fixtures.mjs';
 import { drop, saved, stateless } from './shared.mjs';
 
 let browser;
@@ -225,10 +225,48 @@ inEditor(
   },
 );
 
+inEditor('cloth that is torn in two is shown, joined, and its edges can be typed', async (editor, page) => {
+  const scan = sheetTornInTwo();
+  await drop(page, 'torn.glb', scan);
+  await page.getByText('Bites, rips and tears at the border (1)').waitFor();
+  await editor.idle();
+  const open = await editor.picture();
+  await page.getByRole('button', { name: 'Tear 1' }).click();
+  await editor.idle();
+  assert.ok((await editor.difference(open, await editor.picture())) > 0.0005, 'both edges are seen');
+  await editor.keep('tear-shown');
+  assert.deepEqual(await complaints(page), []);
+  const { draft: told } = await editor.model((it) => ({ draft: it.draft }));
+  await page.getByLabel('Facing from x').waitFor();
+  await editor.button('Without the facing edge').click();
+  assert.equal(await editor.model((it) => it.draft.facing), undefined);
+  await editor.button('Join with a facing edge').click();
+  for (const [end, name] of [
+    ['from', 'Facing from'],
+    ['to', 'Facing to'],
+  ]) {
+    for (const [axis, letter] of ['x', 'y', 'z'].entries()) {
+      await page.getByLabel(`${name} ${letter}`).fill(String(told.facing[end][axis]));
+      await page.keyboard.press('Tab');
+    }
+  }
+  assert.deepEqual(await editor.model((it) => it.draft), told);
+  await editor.button('Mend up to the new hem').click();
+  await editor.idle();
+  assert.equal(await page.getByRole('alert').count(), 0);
+  await editor.keep('tear-mended');
+  assert.ok((await editor.difference(open, await editor.picture())) > 0.005, 'new cloth is seen');
+  await page.getByText('Tear ✓ mended').waitFor();
+  const { holes } = await constraintsOf(editor);
+  assert.equal(holes.length, 1);
+  const bytes = (await saved(editor, page)).bytes;
+  assert.ok(bytes.equals(await stateless(service, JSON.stringify({ holes }), scan)));
+});
+
 inEditor('a bite at the border is shown, mended up to a new hem, and its hem is moved', async (editor, page) => {
   const scan = sheetWithBite();
   await drop(page, 'bite.glb', scan);
-  await page.getByText('Bites and rips at the border (1)').waitFor();
+  await page.getByText('Bites, rips and tears at the border (1)').waitFor();
   await editor.idle();
   const open = await editor.picture();
   await page.getByRole('button', { name: 'Bite or rip 1' }).click();

@@ -221,7 +221,7 @@ function serviceOfFills() {
     holes: async () => ({ loops: [{ id: 1, kind: 'HOLE' }] }),
     openSession: async () => ({ id: 's', holes: [hole] }),
     positions: async () => new Float32Array(9),
-    patches: async () => new ArrayBuffer(0),
+    patches: async () => ({ glb: new ArrayBuffer(0), report: {} }),
     mend: (_, { alternative = 0 }, { signal }) =>
       new Promise((resolve, reject) => {
         signal.addEventListener('abort', () => reject(signal.reason));

@@ -3,8 +3,7 @@ import type { AnchorFound, AnchorQuery, Constraints, Report, Session, SessionHol
 import { Latest } from './latest.js';
 import { ProblemError } from './problem.js';
 import type { Progress } from './requests.js';
-import type { ResultHead } from './result_head.js';
-import type { MapEvents, Service } from './service.js';
+import type { MendedPatches, MapEvents, Service } from './service.js';
 
 /** The new cloth of a hole at one moment. */
 export interface HolePositions {
@@ -103,8 +102,7 @@ export class ClothSession {
   /** The new cloth under constraints, without a report. */
   positions(constraints: Constraints, progress: Progress = {}): Promise<HolePositions[]> {
     return this.within(progress, async (id) => {
-      const positions = await this.service.positions(id, constraints, progress);
-      this.met = JSON.stringify(constraints);
+      const positions = await this.meeting(constraints, () => this.service.positions(id, constraints, progress));
       return this.byHole(positions);
     });
   }
@@ -112,19 +110,19 @@ export class ClothSession {
   /** The new cloth under constraints, and the report. */
   mend(constraints: Constraints, progress: Progress = {}): Promise<{ patches: HolePositions[]; report: Report }> {
     return this.within(progress, async (id) => {
-      const { positions, report } = await this.service.mend(id, constraints, progress);
-      this.met = JSON.stringify(constraints);
+      const { positions, report } = await this.meeting(constraints, () => this.service.mend(id, constraints, progress));
       return { patches: this.byHole(positions), report };
     });
   }
 
-  /** The new cloth as a GLB, one mesh a hole, with texture coordinates, colours and normals. */
-  patches(constraints: Constraints, progress: Progress = {}): Promise<ArrayBuffer> {
-    return this.within(progress, async (id) => {
-      const glb = await this.service.patches(id, constraints, progress);
-      this.met = JSON.stringify(constraints);
-      return glb;
-    });
+  /**
+   * The new cloth as a GLB, one mesh a hole, with texture coordinates, normals and its own colours, and the report, which unlike others says
+   * where the colours of each hole come from.
+   */
+  patches(constraints: Constraints, progress: Progress = {}): Promise<MendedPatches> {
+    return this.within(progress, (id) =>
+      this.meeting(constraints, () => this.service.patches(id, constraints, progress)),
+    );
   }
 
   /** Where on a hole's chart a point in space belongs. */
@@ -145,14 +143,6 @@ export class ClothSession {
     });
   }
 
-  /** The report of the same, which unlike others has the texture of each hole, and the JSON of its glTF; the buffers are not fetched. */
-  resultHead(constraints: Constraints, progress: Progress = {}): Promise<ResultHead> {
-    return this.within(progress, async (id) => {
-      await this.meet(id, constraints, progress);
-      return this.service.resultHead(id, progress);
-    });
-  }
-
   /** Ends the session. */
   close(): void {
     this.service.close(this.id);
@@ -165,9 +155,16 @@ export class ClothSession {
   /** Sees to it that the service met these constraints last: after undo it may have met others since. */
   private async meet(id: string, constraints: Constraints, progress: Progress): Promise<void> {
     if (this.met !== JSON.stringify(constraints)) {
-      await this.service.mend(id, constraints, progress);
-      this.met = JSON.stringify(constraints);
+      await this.meeting(constraints, () => this.service.mend(id, constraints, progress));
     }
+  }
+
+  /** Asks what has the service meet constraints. Until it answers, nobody knows which it met: a request that is stopped may have come. */
+  private async meeting<T>(constraints: Constraints, ask: () => Promise<T>): Promise<T> {
+    this.met = undefined;
+    const answer = await ask();
+    this.met = JSON.stringify(constraints);
+    return answer;
   }
 
   private async within<T>(progress: Progress, task: (id: string) => Promise<T>): Promise<T> {

@@ -6,6 +6,5 @@ export { Latest } from './latest.js';
 export { type Part, partsOf } from './multipart.js';
 export { ProblemError, describeError, isAbort, problemOf } from './problem.js';
 export { type Answer, type Progress } from './requests.js';
-export { type ResultHead, headOfResult } from './result_head.js';
-export { type MapEvents, type MendedPositions, Service } from './service.js';
+export { type MapEvents, type MendedPatches, type MendedPositions, Service } from './service.js';
 export type { ServiceOptions } from './transport.js';

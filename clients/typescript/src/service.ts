@@ -14,13 +14,18 @@ import { Jobs } from './jobs.js';
 import { partsOf } from './multipart.js';
 import { ProblemError } from './problem.js';
 import { type Answer, type Progress, jsonOf, linesOf } from './requests.js';
-import { type ResultHead, headOfResult } from './result_head.js';
 import { type ServiceOptions, Transport, jsonBody } from './transport.js';
 
 /** Patches as positions: `x, y, z` of every patch vertex, hole after hole, in order of id. */
 export interface MendedPositions {
   readonly positions: Float32Array;
   readonly report: Report;
+}
+
+/** Patches as a GLB, and the report. */
+export interface MendedPatches {
+  readonly report: Report;
+  readonly glb: ArrayBuffer;
 }
 
 /** What a map is told of as it is computed. */
@@ -86,9 +91,11 @@ export class Service {
     return { report, positions: new Float32Array(patches.buffer) };
   }
 
-  /** The patches as a GLB, with texture coordinates, colours and normals. */
-  async patches(session: string, constraints: Constraints, progress: Progress): Promise<ArrayBuffer> {
-    return (await this.inpaint(session, constraints, 'model/gltf-binary', progress)).body;
+  /** The patches as a GLB, with texture coordinates, normals and their own colours, and the report, which unlike others says where the colours come from. */
+  async patches(session: string, constraints: Constraints, progress: Progress): Promise<MendedPatches> {
+    const accept = 'multipart/mixed, model/gltf-binary;q=0.9';
+    const { report, patches } = reportAndPatches(await this.inpaint(session, constraints, accept, progress));
+    return { report, glb: patches.buffer };
   }
 
   /** Where on a hole's chart a point in space belongs. */
@@ -122,12 +129,6 @@ export class Service {
   async result(session: string, progress: Progress): Promise<Blob> {
     const answer = await this.transport.send(`sessions/${session}/result`, {}, progress);
     return new Blob([answer.body], { type: answer.contentType });
-  }
-
-  /** The report of the same, and the JSON of its glTF; the buffers are not fetched. */
-  async resultHead(session: string, progress: Progress): Promise<ResultHead> {
-    const request = { headers: { accept: 'multipart/mixed' }, signal: progress.signal ?? null };
-    return headOfResult(await this.transport.openPatiently(`sessions/${session}/result`, request, progress));
   }
 
   /** Ends a session; nothing waits for it, and it may be gone already. */

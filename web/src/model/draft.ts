@@ -61,13 +61,19 @@ export interface PolygonDraft {
   readonly depth?: number;
 }
 
-/** A stretch of the cloth's own edge to mend up to a new hem. */
-export interface BorderDraft {
-  readonly kind: 'border';
+/** A stretch of the cloth's own edge by its ends. */
+export interface EdgeEnds {
   readonly from: Vec3;
   readonly to: Vec3;
+}
+
+/** A stretch of the cloth's own edge to mend up to a new hem. */
+export interface BorderDraft extends EdgeEnds {
+  readonly kind: 'border';
   /** Points that the new hem goes through; without any it continues the hem on both sides. */
   readonly along: readonly Vec3[];
+  /** The torn edge that faces the stretch: the cloth between the two is made. Without `along`. */
+  readonly facing?: EdgeEnds;
 }
 
 /** What changes new cloth. */
@@ -123,7 +129,17 @@ export interface MakingStart {
   readonly candidates: readonly BorderCandidate[];
 }
 
-/** A ball around the edge of the largest hole, a polygon without corners, or the first bite or rip that was found. */
+/** A bite, a rip or a tear that was found. */
+export function bordering({ border }: BorderCandidate): BorderDraft {
+  const ends = ({ from, to }: { from?: number[]; to?: number[] }): EdgeEnds => ({
+    from: pointOf(from),
+    to: pointOf(to),
+  });
+  const facing = border?.facing;
+  return { kind: 'border', ...ends(border ?? {}), along: [], ...(facing && { facing: ends(facing) }) };
+}
+
+/** A ball around the edge of the largest hole, a polygon without corners, or the first place at the border that was found. */
 export function firstMaking(kind: MakingDraft['kind'], { loops, candidates }: MakingStart): MakingDraft {
   const first = firstLoop(loops);
   const centroid = pointOf(first?.centroid);
@@ -135,8 +151,8 @@ export function firstMaking(kind: MakingDraft['kind'], { loops, candidates }: Ma
     case 'polygon':
       return { kind, corners: [] };
     case 'border': {
-      const { from, to } = candidates[0]?.border ?? {};
-      return { kind, from: from ? pointOf(from) : centroid, to: to ? pointOf(to) : centroid, along: [] };
+      const [first] = candidates;
+      return first ? bordering(first) : { kind, from: centroid, to: centroid, along: [] };
     }
   }
 }
@@ -164,8 +180,7 @@ export function withoutLastCorner(draft: PolygonDraft): PolygonDraft {
 
 /** How deep a polygon cuts, in the scene's unit: where nobody has said it, a tenth of the largest distance between two of its corners. */
 export function depthOf({ corners, depth }: PolygonDraft): number {
-  const farthest = (a: Vec3): number =>
-    Math.max(...corners.map((b) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2])));
+  const farthest = (a: Vec3): number => Math.max(...corners.map((b) => distance(a, b)));
   return depth ?? Math.max(0, ...corners.map(farthest)) / 10;
 }
 
@@ -173,15 +188,53 @@ function pointOf([x = 0, y = 0, z = 0]: readonly number[] = []): Vec3 {
   return [x, y, z];
 }
 
-/** The points of a stretch of border that a hand can hold: its ends, then those that the new hem goes through. */
-export function handlesOf({ from, to, along }: BorderDraft): readonly Vec3[] {
-  return [from, to, ...along];
+/** The points of a stretch of border that a hand can hold: its ends, then those of the edge that faces it, or those that the new hem goes through. */
+export function handlesOf({ from, to, along, facing }: BorderDraft): readonly Vec3[] {
+  return facing ? [from, to, facing.from, facing.to] : [from, to, ...along];
+}
+
+/** How many of its handles lie at the cloth's own edge. */
+export function endsOf({ facing }: BorderDraft): number {
+  return facing ? 4 : 2;
 }
 
 /** A stretch with one of its handles elsewhere. */
 export function withHandle(draft: BorderDraft, handle: number, point: Vec3): BorderDraft {
-  const [from, to, ...along] = handlesOf(draft).map((it, at) => (at === handle ? point : it)) as [Vec3, Vec3];
-  return { ...draft, from, to, along };
+  const moved = handlesOf(draft).with(handle, point);
+  if (draft.facing === undefined) {
+    const [from, to, ...along] = moved as [Vec3, Vec3, ...Vec3[]];
+    return { ...draft, from, to, along };
+  }
+  const [from, to, facingFrom, facingTo] = moved as [Vec3, Vec3, Vec3, Vec3];
+  return { ...draft, from, to, facing: { from: facingFrom, to: facingTo } };
+}
+
+/** The stretch with an edge that faces it, whose ends lie at the stretch's until somebody moves them. */
+export function withFacing({ from, to }: BorderDraft): BorderDraft {
+  return { kind: 'border', from, to, along: [], facing: { from, to } };
+}
+
+/** The stretch without an edge that faces it. */
+export function withoutFacing({ from, to }: BorderDraft): BorderDraft {
+  return { kind: 'border', from, to, along: [] };
+}
+
+/** The lines that new hems follow, roughly: from the stretch's one end to its other, or from each end to the nearer one of the edge that faces it. */
+export function newHems({ from, to, along, facing }: BorderDraft): readonly (readonly Vec3[])[] {
+  if (facing === undefined) {
+    return [[from, ...along, to]];
+  }
+  const straight = distance(from, facing.from) + distance(to, facing.to);
+  const crossed = distance(from, facing.to) + distance(to, facing.from);
+  const [first, second] = straight <= crossed ? [facing.from, facing.to] : [facing.to, facing.from];
+  return [
+    [from, first],
+    [to, second],
+  ];
+}
+
+function distance(a: Vec3, b: Vec3): number {
+  return Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }
 
 /** The entry of `holes` that a draft stands for. */
@@ -193,7 +246,9 @@ export function madeBy(draft: MakingDraft): MadeHole {
       return { cut: { polygon: draft.corners.map((corner) => [...corner]), depth: depthOf(draft) } };
     case 'border': {
       const along = draft.along.map((point) => [...point]);
-      return { border: { from: [...draft.from], to: [...draft.to], ...(along.length > 0 && { along }) } };
+      const facing = draft.facing && { from: [...draft.facing.from], to: [...draft.facing.to] };
+      const ends = { from: [...draft.from], to: [...draft.to] };
+      return { border: { ...ends, ...(along.length > 0 && { along }), ...(facing && { facing }) } };
     }
   }
 }

@@ -8,10 +8,12 @@ export interface PlainColour {
   readonly metalness: number;
 }
 
+/** The name of the materials of patches that have a colour of their own. */
+const OWN_COLOUR = 'darn reconstruction';
+
 interface Primitive {
   readonly attributes?: Readonly<Record<string, number>>;
   readonly material?: number;
-  readonly extras?: { readonly darn?: { readonly holes?: readonly { readonly id?: number }[] } };
 }
 
 /** The parts of glTF 2.0 that are read. */
@@ -19,7 +21,9 @@ export interface GltfDocument {
   readonly images?: readonly unknown[];
   readonly meshes?: readonly { readonly primitives?: readonly Primitive[] }[];
   readonly materials?: readonly {
+    readonly name?: string;
     readonly pbrMetallicRoughness?: {
+      readonly baseColorTexture?: unknown;
       readonly baseColorFactor?: readonly number[];
       readonly roughnessFactor?: number;
       readonly metallicFactor?: number;
@@ -47,32 +51,23 @@ export function hasColours({ images = [], meshes = [] }: GltfDocument): boolean 
 }
 
 /**
- * The colours of a mended scan's patches by hole; of those with colours of vertices there is none.
+ * The colours of patches that are neither in images nor the scan's, by hole.
  *
- * @param scan - As it was before.
- * @param holes - Those whose patches have no images.
+ * @param patches - As the service gives them: one mesh a hole, those with a colour of their own in a material of their own.
+ * @param holes - Their ids, in the same order.
  */
 export function plainColours(
-  mended: GltfDocument,
-  scan: GltfDocument,
-  holes: ReadonlySet<number>,
+  { meshes = [], materials = [] }: GltfDocument,
+  holes: readonly number[],
 ): Map<number, PlainColour> {
   const colours = new Map<number, PlainColour>();
-  for (const [at, { primitives = [] }] of (mended.meshes ?? []).entries()) {
-    // A scan that was mended before has patches already, whose holes had numbers of their own.
-    const before = scan.meshes?.[at]?.primitives?.length ?? 0;
-    for (const { attributes = {}, material = -1, extras } of primitives.slice(before)) {
-      const look = mended.materials?.[material]?.pbrMetallicRoughness;
-      if (look === undefined || 'COLOR_0' in attributes) {
-        continue;
-      }
-      const { baseColorFactor = [1, 1, 1], roughnessFactor: roughness = 1, metallicFactor: metalness = 1 } = look;
-      for (const { id = 0 } of extras?.darn?.holes ?? []) {
-        if (holes.has(id)) {
-          colours.set(id, { color: baseColorFactor.slice(0, 3) as Vec3, roughness, metalness });
-        }
-      }
+  for (const [at, id] of holes.entries()) {
+    const { name, pbrMetallicRoughness: look } = materials[meshes[at]?.primitives?.[0]?.material ?? -1] ?? {};
+    if (name !== OWN_COLOUR || look === undefined || look.baseColorTexture !== undefined) {
+      continue;
     }
+    const { baseColorFactor = [1, 1, 1], roughnessFactor: roughness = 1, metallicFactor: metalness = 1 } = look;
+    colours.set(id, { color: baseColorFactor.slice(0, 3) as Vec3, roughness, metalness });
   }
   return colours;
 }

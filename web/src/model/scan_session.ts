@@ -3,7 +3,6 @@ import {
   type AnchorFound,
   type AnchorQuery,
   type HolePositions,
-  type HoleReport,
   type MapEvents,
   type Progress,
   type Report,
@@ -15,7 +14,7 @@ import {
 } from '../client.js';
 import { type Choice, type ClothConstraints, NO_CONSTRAINTS, messageOf, selectionOf } from './constraints.js';
 import type { OpenScan } from './editor_state.js';
-import { type GltfDocument, type PlainColour, hasColours, plainColours } from './gltf_document.js';
+import { type PlainColour, documentOf, hasColours, plainColours } from './gltf_document.js';
 import type { Texture } from './textures.js';
 
 /** What the patches of a session look like: texture coordinates, colours and materials, which of all constraints `texture` alone changes. */
@@ -133,18 +132,18 @@ export class ScanSession {
     }
     const constraints = messageOf({ ...NO_CONSTRAINTS, texture });
     const unconstrained = await cloth.positions(constraints, progress);
-    const glb = await cloth.patches(constraints, progress);
-    const { document } = this.scan;
-    // Of plain cloth there is nothing to say, and the scan need not be written for it.
-    const head = hasColours(document) ? await cloth.resultHead(constraints, progress) : undefined;
-    const holes = head?.report.holes ?? [];
+    const { glb, report } = await cloth.patches(constraints, progress);
+    const holes = report.holes ?? [];
+    // Of plain cloth there is nothing to say.
+    const told = hasColours(this.scan.document) ? holes : [];
     const dressing = {
       glb,
       positions: new Map(unconstrained.map((patch) => [patch.hole.id ?? 0, patch.positions])),
-      textures: new Map(
-        holes.flatMap(({ id = 0, texture: said }) => (said === undefined ? [] : [[id, said] as const])),
+      textures: new Map(told.flatMap(({ id = 0, texture: said }) => (said === undefined ? [] : [[id, said] as const]))),
+      colours: plainColours(
+        documentOf(glb),
+        holes.map(({ id = 0 }) => id),
       ),
-      colours: plainColours((head?.document ?? {}) as GltfDocument, document, withoutImages(holes)),
     };
     dressings.set(texture, dressing);
     return dressing;
@@ -158,13 +157,6 @@ function keyOf({ holes, made, acceptDoubtful }: Choice): string {
 
 function dressed(patches: readonly HolePositions[], dressing: Dressing): Patch[] {
   return patches.map((patch) => ({ ...patch, dressing }));
-}
-
-/** The holes whose colour is neither in images nor the scan's, by id. */
-function withoutImages(holes: readonly HoleReport[]): Set<number> {
-  return new Set(
-    holes.filter(({ texture }) => ['flat', 'none'].includes(texture?.method ?? '')).map(({ id = 0 }) => id),
-  );
 }
 
 /** A report of positions alone, which says nothing of colours, with them. */

@@ -1,7 +1,7 @@
 /** What is drawn for the gesture that is being made. */
 import type { Uv } from '../client.js';
 import { type ClothPoint, locate, normalOf, positionOf } from '../model/cloth.js';
-import { type ClothDraft, type MakingDraft, isMaking } from '../model/draft.js';
+import { type ClothDraft, type MakingDraft, handlesOf, isMaking, newHems } from '../model/draft.js';
 import type { Editor } from '../model/editor.js';
 import type { Patch } from '../model/scan_session.js';
 import { Vector3 } from '../vendor.js';
@@ -52,12 +52,14 @@ function makingMarks(draft: MakingDraft, { stretch }: Waiting): Marked {
     }
     case 'polygon': {
       const corners = draft.corners.map((corner) => new Vector3(...corner));
-      return { handles: corners, stretch: corners.length < 3 ? corners : [...corners, ...corners.slice(0, 1)] };
+      return { handles: corners, stretches: [corners.length < 3 ? corners : [...corners, ...corners.slice(0, 1)]] };
     }
     case 'border': {
-      const [from, to] = [new Vector3(...draft.from), new Vector3(...draft.to)];
-      const along = draft.along.map((point) => new Vector3(...point));
-      return { handles: [from, to, ...along], stretch: stretch(from, to), dashes: [from, ...along, to] };
+      const handles = handlesOf(draft).map((point) => new Vector3(...point));
+      const lines = newHems(draft).map((line) => line.map((point) => new Vector3(...point)));
+      const edges = draft.facing === undefined ? [draft] : [draft, draft.facing];
+      const stretches = edges.map((edge) => stretch(new Vector3(...edge.from), new Vector3(...edge.to)));
+      return { handles, stretches, dashes: lines };
     }
   }
 }

@@ -6,6 +6,7 @@ import {
   type Draft,
   type PolygonDraft,
   firstMaking,
+  endsOf,
   handlesOf,
   withCorner,
   withHandle,
@@ -223,7 +224,7 @@ export class Gestures {
     if (draft?.kind !== 'border') {
       return undefined;
     }
-    const isEnd = part < 2;
+    const isEnd = part < endsOf(draft);
     const target = isEnd
       ? this.viewer.nearestOfBorder(clientX, clientY)
       : this.viewer.onScreenPlane(clientX, clientY, hit.position);

@@ -38,10 +38,10 @@ export interface Marked {
   readonly ring?: readonly Vector3[];
   /** A ball that shows where it goes through the cloth. */
   readonly ball?: { readonly center: Vector3; readonly radius: number };
-  /** A broad line. */
-  readonly stretch?: readonly Vector3[];
-  /** A broad dashed line. */
-  readonly dashes?: readonly Vector3[];
+  /** Broad lines. */
+  readonly stretches?: readonly (readonly Vector3[])[];
+  /** Broad dashed lines. */
+  readonly dashes?: readonly (readonly Vector3[])[];
 }
 
 /** The marks, drawn over everything. */
@@ -59,7 +59,7 @@ export class Marks {
   private readonly lineMaterial = new LineBasicMaterial({ color: HAND, depthTest: false, transparent: true });
 
   /** Shows these marks in place of those before. */
-  show({ handles = [], tethers = [], ring = [], ball, stretch = [], dashes = [] }: Marked): void {
+  show({ handles = [], tethers = [], ring = [], ball, stretches = [], dashes = [] }: Marked): void {
     this.clear();
     if (ball !== undefined) {
       const mark = new Mesh(this.ball, this.cutMaterial);
@@ -68,13 +68,13 @@ export class Marks {
       mark.name = BALL;
       this.group.add(mark);
     }
-    if (stretch.length > 1) {
+    for (const stretch of stretches.filter((line) => line.length > 1)) {
       this.group.add(broadLine(stretch, { color: CUT, linewidth: 6 }));
     }
-    if (dashes.length > 1) {
-      const length = dashes.reduce((sum, point, at) => sum + point.distanceTo(dashes[Math.max(at - 1, 0)] ?? point), 0);
+    for (const line of dashes.filter((each) => each.length > 1)) {
+      const length = line.reduce((sum, point, at) => sum + point.distanceTo(line[Math.max(at - 1, 0)] ?? point), 0);
       const dash = { dashed: true, dashSize: length / 30, gapSize: length / 40 };
-      this.group.add(broadLine(dashes, { color: HAND, linewidth: 3, ...dash }));
+      this.group.add(broadLine(line, { color: HAND, linewidth: 3, ...dash }));
     }
     for (const position of handles) {
       const handle = new Mesh(this.ball, this.ballMaterial);

@@ -1,6 +1,7 @@
 /** The list of boundary loops: which to fill, how long they are, why some are left as they are. */
-import type { BorderCandidate, Loop, Vec3 } from '../client.js';
+import type { BorderCandidate, Loop } from '../client.js';
 import type { MadeHole } from '../model/constraints.js';
+import { bordering } from '../model/draft.js';
 import { byKind, isFillable, isHole, short, styleOf } from '../model/loops.js';
 import { type TemplateResult, css, html, nothing, svg } from '../vendor.js';
 import './fill_stepper.js';
@@ -99,28 +100,29 @@ export class HolesPanel extends Panel {
     `;
   }
 
-  /** Bites and rips at the cloth's own edge; choosing one shows it in the border tool. */
+  /** Bites, rips and tears at the cloth's own edge; choosing one shows it in the border tool. */
   private candidates(): TemplateResult | typeof nothing {
     const candidates = this.editor.scan?.candidates ?? [];
     if (candidates.length === 0) {
       return nothing;
     }
-    const show = ({ border }: BorderCandidate): void => {
-      const { from, to } = border ?? {};
+    const show = (candidate: BorderCandidate): void => {
       this.editor.setTool('border');
-      this.editor.preview({ kind: 'border', from: from as Vec3, to: to as Vec3, along: [] });
+      this.editor.preview(bordering(candidate));
     };
     return html`
-      <h3>Bites and rips at the border (${candidates.length})</h3>
-      <ul aria-label="Bites and rips at the border">
-        ${candidates.map(
-          (candidate, at) => html`
+      <h3>Bites, rips and tears at the border (${candidates.length})</h3>
+      <ul aria-label="Bites, rips and tears at the border">
+        ${candidates.map((candidate, at) => {
+          const isTear = candidate.border?.facing !== undefined;
+          const inward = isTear ? `${short(candidate.length)} long` : `${short(candidate.depth)} deep`;
+          return html`
             <li class="other">
-              <button @click=${() => show(candidate)}>Bite or rip ${at + 1}</button>
-              <span class="quiet small">${short(candidate.mouth)} wide · ${short(candidate.depth)} deep</span>
+              <button @click=${() => show(candidate)}>${isTear ? 'Tear' : 'Bite or rip'} ${at + 1}</button>
+              <span class="quiet small">${short(candidate.mouth)} wide · ${inward}</span>
             </li>
-          `,
-        )}
+          `;
+        })}
       </ul>
     `;
   }
@@ -220,7 +222,8 @@ export class HolesPanel extends Panel {
 
 function nameOf(entry: MadeHole): string {
   if ('border' in entry) {
-    return entry.border.auto ? 'All bites and rips' : 'Part of the border';
+    const part = entry.border.facing ? 'Tear' : 'Part of the border';
+    return entry.border.auto ? 'All bites and rips' : part;
   }
   const { radius, loops, polygon } = entry.cut;
   if (radius !== undefined) {

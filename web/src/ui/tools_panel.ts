@@ -6,24 +6,26 @@ import {
   type BorderDraft,
   type ClothDraft,
   type CutDraft,
+  depthOf,
   type Draft,
   type DraftKind,
-  type GrabDraft,
-  type MakingDraft,
-  type PinchDraft,
-  type PolygonDraft,
-  NAMES,
-  type TwistDraft,
-  depthOf,
   firstDraft,
   firstMaking,
+  type GrabDraft,
   handlesOf,
   isMaking,
   isWhole,
+  type MakingDraft,
+  NAMES,
+  type PinchDraft,
+  type PolygonDraft,
+  type TwistDraft,
   withCorner,
+  withFacing,
   withHandle,
-  withTypedCorner,
+  withoutFacing,
   withoutLastCorner,
+  withTypedCorner,
 } from '../model/draft.js';
 import type { Tool } from '../model/editor_state.js';
 import { isHole } from '../model/loops.js';
@@ -72,7 +74,7 @@ export const TOOLS: readonly { tool: Tool; name: string; key: string; help: stri
     tool: 'border',
     name: NAMES.border,
     key: 'E',
-    help: 'For a bite or a rip at the edge of the cloth: click where it begins and where it ends. New cloth goes up to the dashed line; add points where the new hem should go.',
+    help: 'For a bite or a rip at the edge of the cloth: click where it begins and where it ends. New cloth goes up to the dashed line; add points where the new hem should go. Where the cloth is torn in two, add the edge that faces it: the two are joined.',
   },
 ];
 
@@ -379,16 +381,27 @@ export class ToolsPanel extends Panel {
   }
 
   private borderFields(draft: BorderDraft): TemplateResult {
-    const { from, to, along } = draft;
+    const { from, to, along, facing } = draft;
     const middle = [0, 1, 2].map((axis) => ((from[axis] as number) + (to[axis] as number)) / 2) as Vec3;
     const add = (): void => this.preview({ ...draft, along: [...along, along.at(-1) ?? middle] });
     const remove = (index: number): void => this.preview({ ...draft, along: along.filter((_, at) => at !== index) });
-    const names = ['From', 'To', ...along.map((_, at) => `Hem ${at + 1}`)];
+    const others = facing ? ['Facing from', 'Facing to'] : along.map((_, at) => `Hem ${at + 1}`);
+    const names = ['From', 'To', ...others];
+    const fields = handlesOf(draft).map((point, at) =>
+      this.vectorFields(names[at] as string, point, (moved) => withHandle(draft, at, moved)),
+    );
+    if (facing !== undefined) {
+      return html`
+        ${fields}
+        <div class="row wide">
+          <button type="button" @click=${() => this.preview(withoutFacing(draft))}>Without the facing edge</button>
+        </div>
+      `;
+    }
     return html`
-      ${handlesOf(draft).map((point, at) =>
-        this.vectorFields(names[at] as string, point, (moved) => withHandle(draft, at, moved)),
-      )}
+      ${fields}
       <div class="row wide">
+        <button type="button" @click=${() => this.preview(withFacing(draft))}>Join with a facing edge</button>
         <button type="button" @click=${add}>Add a point of the hem</button>
         ${
           along.length > 0
