@@ -93,7 +93,12 @@ impl PatchDraft<'_> {
         if self.edited {
             return Vec::new();
         }
-        doubts(&self.patch, self.hole.region())
+        let mut reasons = doubts(&self.patch, self.hole.region());
+        let no_fair = self.hole.charted().and_then(|hole| hole.no_fair.as_ref());
+        if let (Some(why), false) = (no_fair, reasons.is_empty()) {
+            reasons.push(format!("a fair surface is none either: {why}"));
+        }
+        reasons
     }
 
     /// The error of a draft that is not applied.

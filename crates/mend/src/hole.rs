@@ -68,6 +68,8 @@ pub struct Hole {
     pub unedited: UneditedCloths,
     /// The textures of its patch made so far.
     pub textures: HoleTextures,
+    /// Why a fair surface is no better, where the patch without constraints is no plausible cloth.
+    pub no_fair: Option<String>,
 }
 
 /// A hole's unedited cloths, by what decides them; the oldest is dropped first.

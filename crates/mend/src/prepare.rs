@@ -388,6 +388,7 @@ impl Preparation<'_> {
             rim_uv,
             unedited: UneditedCloths::default(),
             textures: Default::default(),
+            no_fair: None,
             region,
             chart,
         })

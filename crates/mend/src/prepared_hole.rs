@@ -68,28 +68,31 @@ impl PreparedHole {
         inpainter: &Inpainter,
         call: Call,
     ) -> Result<PreparedHole, MendError> {
-        let PreparedHole::Charted(hole) = &self else {
+        let PreparedHole::Charted(mut hole) = self else {
             return Ok(self);
         };
-        let doubts = match hole.unedited(inpainter, call) {
+        let found = match hole.unedited(inpainter, call) {
             Ok(unedited) => doubts(&unedited.patch, &hole.region),
             Err(MendError::Patch { source, .. }) => vec![source.to_string()],
             Err(error) => return Err(error),
         };
-        if doubts.is_empty() {
-            return Ok(self);
+        if found.is_empty() {
+            return Ok(PreparedHole::Charted(hole));
         }
         let reason = format!(
             "laid in its chart, its patch is no plausible cloth: {}",
-            doubts.join("; ")
+            found.join("; ")
         );
-        match FairHole::new(welded, hole.id, reason, call) {
-            Ok(fair) if crate::doubts::doubts(&fair.fair.patch, &fair.region).is_empty() => {
-                Ok(PreparedHole::Fair(Box::new(fair)))
-            }
-            Err(MendError::Exhausted(exhausted)) => Err(exhausted.into()),
-            _ => Ok(self),
-        }
+        let why_not = match FairHole::new(welded, hole.id, reason, call) {
+            Ok(fair) => match doubts(&fair.fair.patch, &fair.region) {
+                none if none.is_empty() => return Ok(PreparedHole::Fair(Box::new(fair))),
+                some => some.join("; "),
+            },
+            Err(MendError::Exhausted(exhausted)) => return Err(exhausted.into()),
+            Err(error) => error.to_string(),
+        };
+        hole.no_fair = Some(why_not);
+        Ok(PreparedHole::Charted(hole))
     }
 
     /// The loop's id.
