@@ -17,12 +17,18 @@ const NARROW: f64 = 2.0;
 /// Least length of a spike ÷ median edge of the cloth at the rim: short teeth belong to a ragged tear. With 2, teeth of clean cuts through a
 /// triangulation are taken for spikes.
 const LONG: f64 = 2.5;
+/// A piece is a tongue of the cloth, and no spike, where none of its edges is longer than this many median edges of the cloth at the rim, …
+const CLOTH_EDGE: f64 = 1.75;
+/// … nowhere two of its triangles meet, nor it and the cloth at its neck, at a larger angle than 30° (its cosine), …
+const LEAST_SMOOTH: f64 = 0.866;
+/// … and it is no longer than this many median edges: longer ones are threads.
+const LONGEST_TONGUE: f64 = 6.0;
 /// Nanoseconds of work a rim vertex or face.
 const STEP_WORK: u64 = 100;
 
 /// The faces of all spikes and threads at a rim, ascending: pieces beyond an inner edge between two of its vertices
 /// (their neck) of at least twice the length of the neck and two and a half times that of the cloth's edges. Half of its border
-/// is a piece's length.
+/// is a piece's length. Tongues of cloth, whose triangles are like those around and go on from them smoothly, are none.
 ///
 /// # Errors
 /// `Exhausted`.
@@ -47,7 +53,8 @@ pub fn spikes(
         along.push(along[along.len() - 1] + edge.norm());
     }
     let whole = along[count];
-    let long = LONG * median_edge(mesh, topology, rim);
+    let median = median_edge(mesh, topology, rim);
+    let long = LONG * median;
     let mut found = Vec::new();
     for (to, v) in rim.vertices.iter().enumerate() {
         for &neck in topology.leaving(*v) {
@@ -66,7 +73,11 @@ pub fn spikes(
             let most = 2 * ((to + count - from) % count);
             if let Some(piece) = piece_beyond(topology, neck, most) {
                 steps.take(STEP_WORK * piece.len() as u64)?;
-                found.extend(piece);
+                let is_tongue =
+                    length <= LONGEST_TONGUE * median && is_cloth(mesh, topology, &piece, median);
+                if !is_tongue {
+                    found.extend(piece);
+                }
             }
         }
     }
@@ -97,6 +108,26 @@ fn piece_beyond(topology: &Topology, neck: HalfEdgeId, most: usize) -> Option<Ve
     Some(piece)
 }
 
+/// Whether triangles are as large as others with edges of this length, and go on smoothly from each other and from the cloth they hang on.
+fn is_cloth(mesh: &TriMesh, topology: &Topology, piece: &[FaceId], median: f64) -> bool {
+    let normal = |f: FaceId| {
+        let [a, b, c] = mesh.triangle(f.index());
+        (b - a).cross(&(c - a)).try_normalize(f64::MIN_POSITIVE)
+    };
+    piece.iter().all(|f| {
+        f.half_edges().iter().all(|h| {
+            let ends = [topology.origin(*h), topology.target(*h)];
+            let [from, to] = ends.map(|v| mesh.positions[v.index()]);
+            let beyond = topology.twin(*h).map(HalfEdgeId::face);
+            let is_smooth = beyond.is_none_or(|beyond| match (normal(*f), normal(beyond)) {
+                (Some(own), Some(other)) => own.dot(&other) >= LEAST_SMOOTH,
+                _ => false,
+            });
+            is_smooth && (to - from).norm() <= CLOTH_EDGE * median
+        })
+    })
+}
+
 /// Median length of the inner edges at a rim, scene units; 0 without any. Most of them are edges of the cloth even
 /// where every edge of the rim is a spike's.
 fn median_edge(mesh: &TriMesh, topology: &Topology, rim: &BoundaryLoop) -> f64 {
@@ -121,7 +152,7 @@ mod tests {
     use crate::mesh::Vec3;
     use crate::mesh::loops::{LoopKind, boundary_loops};
     use crate::mesh::region::BoundedMesh;
-    use crate::mesh::shapes::{fray, holed_sheet, jitter};
+    use crate::mesh::shapes::{fray, holed_sheet, jitter, sheet};
     use crate::mesh::sound_hole::SoundHole;
     use crate::mesh::weld::weld;
 
@@ -146,6 +177,34 @@ mod tests {
 
     fn in_the_middle(p: &Vec3) -> bool {
         (p.x - 0.5).hypot(p.y - 0.5) < 0.45
+    }
+
+    /// A sheet with a hole into which a tongue of the cloth reaches, one square wide and `length` squares long, bent up at its neck.
+    fn with_tongue(length: usize, bend: f64) -> TriMesh {
+        let side = 24.0;
+        let keep = |u: f64, v: f64| {
+            let (i, j) = ((u * side) as usize, (v * side) as usize);
+            let in_hole = (8..16).contains(&i) && (8..16).contains(&j);
+            !in_hole || (i == 12 && j < 8 + length)
+        };
+        sheet(24, keep, |u, v| {
+            let (beside, along) = ((side * u - 12.5).abs(), side * v - 8.0);
+            match beside < 0.6 && (0.1..length as f64 + 0.1).contains(&along) {
+                true => Vec3::new(side * u, 8.0 + along * bend.cos(), along * bend.sin()),
+                false => Vec3::new(side * u, side * v, 0.0),
+            }
+        })
+    }
+
+    #[test]
+    fn a_tongue_of_the_cloth_is_no_spike_unless_it_stands_up_or_is_a_thread() {
+        for length in [3, 5] {
+            assert_eq!(without_spikes(&with_tongue(length, 0.0)).0, []);
+            assert_eq!(without_spikes(&with_tongue(length, 0.3)).0, []);
+            let standing = without_spikes(&with_tongue(length, 1.2)).0;
+            assert_eq!(standing.len(), 2 * length);
+        }
+        assert_eq!(without_spikes(&with_tongue(7, 0.0)).0.len(), 14);
     }
 
     proptest! {
