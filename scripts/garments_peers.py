@@ -135,21 +135,20 @@ def table(ours, theirs):
     """Means over the holes that both filled, moth holes apart."""
     rows = [{row["name"]: row for row in json.loads(path.read_text())["holes"]} for path in (ours, theirs)]
     both = [name for name, row in rows[0].items() if "chamfer" in row and "chamfer" in rows[1].get(name, {})]
-    print("| holes | n | chamfer | CGAL | ratio | median of ratios | h95 | CGAL | normals | CGAL | area | CGAL | too curved | CGAL |")
-    print("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|")
+    print("| holes | n | chamfer | CGAL | ratio | to the surface | CGAL | ratio | h95 | CGAL | normals | CGAL | area | CGAL | too curved | CGAL |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|")
     groups = [(band, lambda row, band=band: row["share"] and row["band"] == band) for band in BANDS]
     groups += [("moth holes", lambda row: not row["share"]), ("all but moth holes", lambda row: row["share"])]
     for name, among in groups:
         own = [key for key in both if among(rows[0][key])]
         if not own:
             continue
-        columns = {k: [[side[key][k] for key in own] for side in rows] for k in ("chamfer", "h95", "normal", "area", "mean_curvature")}
+        columns = {k: [[side[key][k] for key in own] for side in rows] for k in ("chamfer", "surface", "h95", "normal", "area", "mean_curvature")}
         mean = {k: [np.mean(side) for side in sides] for k, sides in columns.items()}
         curved = [sum(x > 1.5 for x in side) for side in columns["mean_curvature"]]
-        ratio = mean["chamfer"][0] / mean["chamfer"][1]
-        each = np.median(np.divide(*columns["chamfer"]))
+        ratio, surface = (mean[key][0] / mean[key][1] for key in ("chamfer", "surface"))
         pair = lambda k, form: " | ".join(form % x for x in mean[k])
-        print(f"| {name} | {len(own)} | {pair('chamfer', '%.2f')} | {ratio:.2f} | {each:.2f} | {pair('h95', '%.2f')} | "
+        print(f"| {name} | {len(own)} | {pair('chamfer', '%.2f')} | {ratio:.2f} | {pair('surface', '%.2f')} | {surface:.2f} | {pair('h95', '%.2f')} | "
               f"{pair('normal', '%.1f')} | {pair('area', '%.3f')} | {curved[0]} | {curved[1]} |")
     worst = sorted(both, key=lambda key: -rows[0][key]["chamfer"])[:8]
     print("\nworst of ours:")

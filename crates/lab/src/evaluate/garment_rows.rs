@@ -297,7 +297,7 @@ impl GarmentReport {
             count(&curved),
         );
         text.push_str(
-            "| holes | n | mended | chamfer % | median | h95 % | normals deg | area | too curved |\n|---|---|---|---|---|---|---|---|---|\n",
+            "| holes | n | mended | chamfer % | median | to the surface % | h95 % | normals deg | area | too curved |\n|---|---|---|---|---|---|---|---|---|---|\n",
         );
         for band in FlatnessBand::ALL {
             let name = format!("flat within {}", band.name());
@@ -344,10 +344,11 @@ impl GarmentReport {
         let curved = fills.iter().filter(|f| f.mean_curvature > TOO_CURVED);
         let _ = writeln!(
             text,
-            "| {name} | {} | {} | {:.2} | {median:.2} | {:.2} | {:.1} | {:.3} | {} |",
+            "| {name} | {} | {} | {:.2} | {median:.2} | {:.2} | {:.2} | {:.1} | {:.3} | {} |",
             own.len(),
             fills.len(),
             mean(&|f| f.metrics.chamfer),
+            mean(&|f| f.metrics.surface),
             mean(&|f| f.metrics.h95),
             mean(&|f| f.metrics.normal),
             mean(&|f| f.metrics.area),

@@ -18,6 +18,7 @@ mod metrics;
 mod patched;
 mod report;
 mod scan_rows;
+mod surface_distance;
 mod sweep;
 
 #[cfg(test)]
