@@ -152,7 +152,7 @@ fn cloth_torn_in_two_is_joined_by_its_candidate() {
         let [tear] = &told[..] else {
             panic!("{turned:?}, fold {fold}: {told:?}");
         };
-        assert!((0.9..1.3).contains(&tear.length), "{tear:?}");
+        assert!((0.95..1.4).contains(&tear.length), "{tear:?}");
         assert!((0.08..0.16).contains(&tear.mouth), "{tear:?}");
         assert!(tear.facing_loop.is_some_and(|other| other != tear.r#loop));
         let message = v1::Constraints {
@@ -193,6 +193,38 @@ fn cloth_torn_in_two_is_joined_by_its_candidate() {
         let before = read(&bytes).surface.faces;
         assert!(read(&answer.bytes).surface.faces.starts_with(&before));
     }
+}
+
+#[test]
+fn an_edge_that_is_torn_more_raggedly_than_its_piece_is_long_is_joined_from_corner_to_corner() {
+    // Teeth of one square, three squares deep: each torn edge is longer than the rest of its piece's.
+    let keep = |u: f64, v: f64| {
+        let tooth = 3.0 / 48.0 * f64::from((v * 48.0) as u32 % 2);
+        (u - 0.35 - tooth).abs() > 0.05
+    };
+    let mesh = torn(keep, 0.0);
+    let bytes = packed(&mesh, &[]);
+    let told = candidates(&bytes);
+    let [tear] = &told[..] else {
+        panic!("{told:?}");
+    };
+    assert!(tear.length > 2.5, "{tear:?}");
+    let border = tear.border.clone().expect("a border");
+    let facing = border.facing.clone().expect("a torn edge");
+    for end in [&border.from, &border.to, &facing.from, &facing.to] {
+        assert!(end[1] < 1e-6 || end[1] > 1.0 - 1e-6, "no corner: {end:?}");
+    }
+    let message = v1::Constraints {
+        holes: vec![v1::HoleSelector {
+            border: Some(border),
+            ..Default::default()
+        }],
+        ..Default::default()
+    };
+    let named = Constraints::check(&message).expect("a tear that can be sent");
+    let answer = mended(&bytes, &named).unwrap();
+    let share = share_mended(&answer.bytes, &mesh, 0.0);
+    assert!((0.95..1.05).contains(&share), "{share}");
 }
 
 #[test]

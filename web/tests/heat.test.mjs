@@ -168,13 +168,22 @@ test('a stretch of border goes the shorter way between the nearest vertices', ()
   );
   const xy = (stretch) => stretch.map(([x, y]) => [x, y]);
   const lines = [{ points }, { points: points.map((x) => x + 50) }];
-  const stretch = stretchBetween(lines, [0.1, 0.9, 0], [1, -0.2, 0]);
+  const stretch = stretchBetween(lines, { from: [0.1, 0.9, 0], to: [1, -0.2, 0] });
   assert.deepEqual(xy(stretch), [
     [0, 1],
     [0, 0],
     [1, 0],
   ]);
-  assert.deepEqual(stretchBetween([], [0, 0, 0], [0, 0, 0]), []);
+  const ends = { from: [0, 1, 0], to: [2, 1, 0] };
+  for (const [y, way] of [
+    [3, [2, 2, 2]],
+    [-1, [0, 0, 0]],
+  ]) {
+    const facing = { from: [2, y, 0], to: [0, y, 0] };
+    const nearer = stretchBetween(lines, ends, facing).map(([, height]) => height);
+    assert.deepEqual(nearer, [1, ...way, 1]);
+  }
+  assert.deepEqual(stretchBetween([], { from: [0, 0, 0], to: [0, 0, 0] }), []);
 });
 
 test('a map grows by its pieces until it has every cell', () => {

@@ -529,7 +529,7 @@ export interface components {
             /** @description A stretch of the cloth's own edge, such as a bite or a rip, to mend up to a new hem. In JSON, `"auto"` may stand for `{"auto": true}`. */
             border?: components["schemas"]["Border"];
         };
-        /** @description A stretch of the cloth's own edge: the shorter way from `from` to `to`; where the cloth is torn in two, with the edge that faces it; or, with `auto` alone, every bite and rip that is found. */
+        /** @description A stretch of the cloth's own edge: the shorter way from `from` to `to`; where the cloth is torn in two, the torn edge, with the one that faces it; or, with `auto` alone, every bite and rip that is found. */
         Border: {
             /** @description Whether every bite and rip that is found is mended. */
             auto?: boolean;
@@ -542,7 +542,7 @@ export interface components {
             /** @description The torn edge that faces the stretch, of another piece of the cloth or of the same: the cloth between the two is made new, and both hems go on from the one to the other. Without `along`. */
             facing?: components["schemas"]["TornEdge"];
         };
-        /** @description The edge of a tear: the shorter way along the cloth's own edge from one place to another. */
+        /** @description The edge of a tear: of the two ways along the cloth's own edge from one place to another, the one that lies nearer to the edge that faces it. */
         TornEdge: {
             /** @description Where it starts, `[x, y, z]`: the nearest vertex of the cloth's own edge. */
             from?: number[];

@@ -13,6 +13,7 @@ use crate::welded_scan::WeldedScan;
 use darn_budget::{Budget, Exhausted, Steps};
 use darn_contract::{Border, Constraints, FieldError, HoleSelector, TornEdge, v1};
 use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind};
+use darn_geometry::mesh::nearest::distance_to_segment;
 use darn_geometry::mesh::{TriMesh, Vec3};
 use darn_gltf_scan::Scan;
 
@@ -103,6 +104,12 @@ impl<'a> Stretch<'a> {
     fn vertices(&self) -> impl Iterator<Item = usize> {
         let n = self.rim.vertices.len();
         (self.from..=self.from + self.edges).map(move |k| k % n)
+    }
+
+    /// The places of these vertices, scene space.
+    fn places(&self, whole: &WeldedScan) -> impl Iterator<Item = Vec3> {
+        let places = self.from..=self.from + self.edges;
+        places.map(|k| whole.rim_position(self.rim, k))
     }
 
     fn overlaps(&self, other: &Stretch) -> bool {
@@ -310,7 +317,7 @@ fn closings_of<'a>(
     border: &Border,
     budget: &Budget,
 ) -> Result<Result<Vec<Closing<'a>>, String>, Exhausted> {
-    let (from, to, along) = match border {
+    let (ends, along) = match border {
         Border::Auto => {
             let found = all_bites(whole, budget)?.into_iter();
             let stretch = |(rim, bite): (&'a BoundaryLoop, Bite)| Stretch {
@@ -328,10 +335,19 @@ fn closings_of<'a>(
             });
         }
         Border::Tear([first, second]) => {
-            let named = |edge: &TornEdge| {
-                stretch_between(whole, Vec3::from(edge.from), Vec3::from(edge.to), budget)
+            let ends = |edge: &TornEdge| [edge.from, edge.to].map(Vec3::from);
+            // Of the two ways along a piece's edge, the one that lies along the other torn edge.
+            let named = |own: &TornEdge, other: &TornEdge| {
+                let [from, to] = ends(other);
+                let away = |stretch: &Stretch| {
+                    let places = stretch
+                        .places(whole)
+                        .map(|p| distance_to_segment(&p, &from, &to));
+                    places.sum::<f64>() / (stretch.edges + 1) as f64
+                };
+                stretch_between(whole, ends(own), &away, budget)
             };
-            let (first, second) = (named(first)?, named(second)?);
+            let (first, second) = (named(first, second)?, named(second, first)?);
             return Ok(first.and_then(|first| {
                 let second = second.map_err(|detail| format!("in `facing`, {detail}"))?;
                 let edges = [first.stretch, second.stretch];
@@ -341,9 +357,16 @@ fn closings_of<'a>(
                 }
             }));
         }
-        Border::Line { from, to, along } => (Vec3::from(*from), Vec3::from(*to), along),
+        Border::Line { from, to, along } => ([*from, *to].map(Vec3::from), along),
     };
-    let stretch = stretch_between(whole, from, to, budget)?;
+    let length = |stretch: &Stretch| -> f64 {
+        let places: Vec<Vec3> = stretch.places(whole).collect();
+        places
+            .windows(2)
+            .map(|ends| (ends[1] - ends[0]).norm())
+            .sum()
+    };
+    let stretch = stretch_between(whole, ends, &length, budget)?;
     Ok(stretch.map(|named| {
         let mut along: Vec<Vec3> = along.iter().map(|p| Vec3::from(*p)).collect();
         if named.runs_back {
@@ -353,18 +376,19 @@ fn closings_of<'a>(
     }))
 }
 
-/// The shorter way along a loop between two points.
+/// A way along a loop between two points.
 struct NamedStretch<'a> {
     stretch: Stretch<'a>,
     /// Whether it starts at the second point.
     runs_back: bool,
 }
 
-/// The stretch of the cloth's own edge between the places nearest to two points, or why there is none.
+/// The stretch of the cloth's own edge between the places nearest to two points, of the two ways the one with the smaller `cost`; or why there
+/// is none.
 fn stretch_between<'a>(
     whole: &'a WeldedScan,
-    from: Vec3,
-    to: Vec3,
+    [from, to]: [Vec3; 2],
+    cost: &dyn Fn(&Stretch) -> f64,
     budget: &Budget,
 ) -> Result<Result<NamedStretch<'a>, String>, Exhausted> {
     let mut steps = Steps::of(budget);
@@ -393,23 +417,15 @@ fn stretch_between<'a>(
         let detail = "`from` and `to` are nearest to the same vertex of the cloth's edge";
         return Ok(Err(detail.to_owned()));
     }
-    let length = |from: usize, to: usize| -> f64 {
-        let ends = (from..from + ahead(rim, from, to))
-            .map(|k| whole.rim_position(rim, k + 1) - whole.rim_position(rim, k));
-        ends.map(|edge| edge.norm()).sum()
+    let way = |from: usize, to: usize| Stretch {
+        rim,
+        from,
+        edges: ahead(rim, from, to),
     };
-    // The loop has the cloth on its left.
-    let runs_back = length(start, end) > length(end, start);
-    let (first, last) = match runs_back {
-        false => (start, end),
-        true => (end, start),
-    };
+    let (on, back) = (way(start, end), way(end, start));
+    let runs_back = cost(&on) > cost(&back);
     Ok(Ok(NamedStretch {
-        stretch: Stretch {
-            rim,
-            from: first,
-            edges: ahead(rim, first, last),
-        },
+        stretch: if runs_back { back } else { on },
         runs_back,
     }))
 }

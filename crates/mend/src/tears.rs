@@ -22,6 +22,10 @@ const LEAST_FACING: f64 = 0.5;
 const BESIDE: usize = 2;
 /// Samples in a row that may look elsewhere within a torn edge: a torn edge is ragged.
 const RAGGED: usize = 3;
+/// Edges beyond such samples in which the corner of a torn edge is looked for.
+const CORNER: usize = 4;
+/// How far a corner may be from the other edge, in widths of the gap.
+const FARTHER: f64 = 1.5;
 /// Least share of a torn edge whose nearest points lie on the other.
 const LEAST_MUTUAL: f64 = 0.7;
 /// Nanoseconds of work a pair of points.
@@ -130,6 +134,16 @@ struct Run {
     gap: f64,
 }
 
+/// A way beyond the end of a run.
+struct Walk {
+    /// The run's last vertex.
+    vertex: usize,
+    /// Vertices of a step.
+    by: usize,
+    /// From the run's other end to this one.
+    along: Vec3,
+}
+
 impl Run {
     fn has(&self, vertex: usize) -> bool {
         (vertex + self.vertices - self.from) % self.vertices <= self.edges
@@ -221,33 +235,55 @@ impl<'a> Edge<'a> {
             .take(length)
             .copied()
             .collect();
-        let (start, end) = (run[0].0, run[length - 1].0);
         let n = self.points.len();
-        // Up to the sample before and after, vertex by vertex.
-        let all: Vec<usize> = (0..other.points.len()).collect();
-        let mut grown = |from: usize, most: usize, by: usize| -> Result<usize, Exhausted> {
-            let mut steps_taken = 0;
-            while steps_taken + 1 < most {
-                steps.take(PAIR_WORK * all.len() as u64)?;
-                let vertex = (from + by * (steps_taken + 1)) % n;
-                if self.facing(vertex, other, &all, reach).is_none() {
-                    break;
-                }
-                steps_taken += 1;
-            }
-            Ok(steps_taken)
-        };
-        let spacing = n.div_ceil(count);
-        let (from, to) = (self.samples[start], self.samples[end]);
-        let back = grown(from, spacing, n - 1)?;
-        let on = grown(to, spacing, 1)?;
+        let gap = run.iter().map(|(.., gap)| gap).sum::<f64>() / length as f64;
+        let ends = [run[0].0, run[length - 1].0].map(|s| self.samples[s]);
+        let [back, on] =
+            [(ends[0], ends[1], n - 1), (ends[1], ends[0], 1)].map(|(vertex, opposite, by)| {
+                let along = self.points[vertex].0 - self.points[opposite].0;
+                let walk = Walk { vertex, by, along };
+                self.corner_ahead(&walk, other, FARTHER * gap, steps)
+            });
+        let (back, on) = (back?, on?);
         Ok(Some(Run {
-            from: (from + n - back) % n,
-            edges: (to + n - from) % n + back + on,
+            from: (ends[0] + n - back) % n,
+            edges: (ends[1] + n - ends[0]) % n + back + on,
             vertices: n,
-            gap: run.iter().map(|(.., gap)| gap).sum::<f64>() / length as f64,
+            gap,
             nearest: run.into_iter().map(|(_, nearest, _)| nearest).collect(),
         }))
+    }
+
+    /// How many edges beyond the end of a run its corner lies: where the loop has gone farthest along the run, not farther than `most` from
+    /// the other loop.
+    fn corner_ahead(
+        &self,
+        walk: &Walk,
+        other: &Edge,
+        most: f64,
+        steps: &mut Steps,
+    ) -> Result<usize, Exhausted> {
+        let n = self.points.len();
+        let Some(along) = walk.along.try_normalize(f64::MIN_POSITIVE) else {
+            return Ok(0);
+        };
+        let start = self.points[walk.vertex].0;
+        let edge = self.rim.length / n as f64;
+        let (mut corner, mut farthest) = (0, 0.0);
+        for k in 1..=(RAGGED + 1) * n.div_ceil(self.samples.len()) + CORNER {
+            steps.take(PAIR_WORK * other.points.len() as u64)?;
+            let place = self.points[(walk.vertex + k * walk.by) % n].0;
+            let distances = other.points.iter().map(|(p, _)| (p - place).norm());
+            if distances.fold(f64::INFINITY, f64::min) > most {
+                break;
+            }
+            let gone = along.dot(&(place - start));
+            // A hem that goes on at a right angle goes no farther.
+            if gone > farthest + 0.25 * edge {
+                (corner, farthest) = (k, gone);
+            }
+        }
+        Ok(corner)
     }
 
     /// Length of a stretch, scene units.

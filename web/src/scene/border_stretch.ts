@@ -1,9 +1,13 @@
 /** Stretches of the cloth's own edge, as the service takes them: by the nearest vertices, the shorter way. */
 import type { Vec3 } from '../client.js';
+import type { EdgeEnds } from '../model/draft.js';
 import type { BoundaryLine } from './boundary.js';
 
-/** The shorter way along the line that comes nearest to `from`, to its vertex nearest to `to`. */
-export function stretchBetween(lines: Iterable<BoundaryLine>, from: Vec3, to: Vec3): Vec3[] {
+/**
+ * The way along the line that comes nearest to `from`, to its vertex nearest to `to`: the shorter one, or that which lies nearer to the ends of the
+ * edge that faces it.
+ */
+export function stretchBetween(lines: Iterable<BoundaryLine>, { from, to }: EdgeEnds, facing?: EdgeEnds): Vec3[] {
   let best: { points: Vec3[]; at: number; distance: number } | undefined;
   for (const line of lines) {
     const points = pointsOf(line);
@@ -27,7 +31,9 @@ export function stretchBetween(lines: Iterable<BoundaryLine>, from: Vec3, to: Ve
     return stretch;
   };
   const [forth, back] = [way(1), way(-1)];
-  return lengthOf(forth) <= lengthOf(back) ? forth : back;
+  const cost = (stretch: readonly Vec3[]): number =>
+    facing === undefined ? lengthOf(stretch) : meanDistance(stretch, facing);
+  return cost(forth) <= cost(back) ? forth : back;
 }
 
 /** The vertices of a boundary. */
@@ -44,6 +50,20 @@ function nearest(points: readonly Vec3[], to: Vec3): { at: number; distance: num
     }
   });
   return best;
+}
+
+function meanDistance(points: readonly Vec3[], { from, to }: EdgeEnds): number {
+  const line = [0, 1, 2].map((axis) => (to[axis] as number) - (from[axis] as number)) as Vec3;
+  const square = line[0] ** 2 + line[1] ** 2 + line[2] ** 2;
+  const each = points.map((point) => {
+    const along = line.reduce(
+      (sum, value, axis) => sum + value * ((point[axis] as number) - (from[axis] as number)),
+      0,
+    );
+    const share = square > 0 ? Math.min(Math.max(along / square, 0), 1) : 0;
+    return distanceOf(point, from.map((value, axis) => value + share * (line[axis] as number)) as Vec3);
+  });
+  return each.reduce((sum, distance) => sum + distance, 0) / points.length;
 }
 
 function lengthOf(points: readonly Vec3[]): number {

@@ -1,7 +1,7 @@
 /** What is drawn for the gesture that is being made. */
 import type { Uv } from '../client.js';
 import { type ClothPoint, locate, normalOf, positionOf } from '../model/cloth.js';
-import { type ClothDraft, type MakingDraft, handlesOf, isMaking, newHems } from '../model/draft.js';
+import { type ClothDraft, type EdgeEnds, type MakingDraft, handlesOf, isMaking, newHems } from '../model/draft.js';
 import type { Editor } from '../model/editor.js';
 import type { Patch } from '../model/scan_session.js';
 import { Vector3 } from '../vendor.js';
@@ -16,8 +16,8 @@ export interface Waiting {
   readonly cloth: ClothPoint | undefined;
   /** The first end of a stretch of border. */
   readonly border: Vector3 | undefined;
-  /** The shorter way along the cloth's own edge. */
-  stretch(from: Vector3, to: Vector3): Vector3[];
+  /** The way along the cloth's own edge. */
+  stretch(edge: EdgeEnds, facing?: EdgeEnds): Vector3[];
 }
 
 /**
@@ -57,8 +57,8 @@ function makingMarks(draft: MakingDraft, { stretch }: Waiting): Marked {
     case 'border': {
       const handles = handlesOf(draft).map((point) => new Vector3(...point));
       const lines = newHems(draft).map((line) => line.map((point) => new Vector3(...point)));
-      const edges = draft.facing === undefined ? [draft] : [draft, draft.facing];
-      const stretches = edges.map((edge) => stretch(new Vector3(...edge.from), new Vector3(...edge.to)));
+      const { facing } = draft;
+      const stretches = facing === undefined ? [stretch(draft)] : [stretch(draft, facing), stretch(facing, draft)];
       return { handles, stretches, dashes: lines };
     }
   }

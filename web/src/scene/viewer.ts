@@ -19,6 +19,7 @@ import {
   Vector3,
   WebGLRenderer,
 } from '../vendor.js';
+import type { EdgeEnds } from '../model/draft.js';
 import { stretchBetween, pointsOf } from './border_stretch.js';
 import { linesOfLoops } from './boundary.js';
 import { Marks } from './marks.js';
@@ -181,9 +182,9 @@ export class Viewer {
     );
   }
 
-  /** The shorter way along the cloth's own edge between its vertices nearest to two points. */
-  stretchBetween(from: Vector3, to: Vector3): Vector3[] {
-    const stretch = stretchBetween(this.rims?.borders ?? [], from.toArray(), to.toArray());
+  /** The way along the cloth's own edge between its vertices nearest to two points: the shorter one, or that along the edge that faces it. */
+  stretchBetween(edge: EdgeEnds, facing?: EdgeEnds): Vector3[] {
+    const stretch = stretchBetween(this.rims?.borders ?? [], edge, facing);
     return stretch.map((point) => new Vector3(...point));
   }
 

@@ -97,7 +97,7 @@ export class Stage extends Panel {
       marksOf(this.editor, {
         cloth: this.gestures?.waitingPoint,
         border: this.gestures?.waitingEnd,
-        stretch: (from, to) => this.viewer?.stretchBetween(from, to) ?? [],
+        stretch: (edge, facing) => this.viewer?.stretchBetween(edge, facing) ?? [],
       }),
     );
   }

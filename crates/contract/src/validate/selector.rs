@@ -34,7 +34,7 @@ pub enum Border {
     Tear([TornEdge; 2]),
 }
 
-/// The edge of a tear: the shorter way along the cloth's own edge from one place to another.
+/// The edge of a tear: of the two ways along the cloth's own edge from one place to another, the one nearer to the edge that faces it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TornEdge {
     /// Near where it starts.

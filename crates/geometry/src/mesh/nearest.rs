@@ -23,7 +23,8 @@ pub fn distance_to_loop(mesh: &TriMesh, rim: &BoundaryLoop, point: &Vec3) -> f64
         .fold(f64::INFINITY, f64::min)
 }
 
-fn distance_to_segment(point: &Vec3, a: &Vec3, b: &Vec3) -> f64 {
+/// Distance from `point` to the line from `a` to `b`, scene units.
+pub fn distance_to_segment(point: &Vec3, a: &Vec3, b: &Vec3) -> f64 {
     let (along, to) = (b - a, point - a);
     let square = along.norm_squared();
     let t = if square > 0.0 {
