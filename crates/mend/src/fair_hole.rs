@@ -3,6 +3,7 @@
 
 use std::time::Instant;
 
+use crate::doubts::FEW_CUTS;
 use crate::error::MendError;
 use crate::fill_hole::PatchDraft;
 use crate::mender::Call;
@@ -16,7 +17,7 @@ use darn_geometry::mesh::denoise::denoise;
 use darn_geometry::mesh::index::LoopId;
 use darn_geometry::mesh::layers::Layers;
 use darn_geometry::mesh::region::{self, Region};
-use darn_geometry::patch::{FairPatch, PatchWork};
+use darn_geometry::patch::{FairPatch, Fairness, PatchWork};
 
 /// A hole without a chart, and the fair surface that closes it.
 pub struct FairHole {
@@ -63,17 +64,29 @@ impl FairHole {
             budget,
         };
         let seen = smooth.as_ref().unwrap_or(&region);
-        let fair = FairPatch::new(seen, work)
-            .and_then(|fair| match &smooth {
-                Some(_) => fair.with_region_at(&region.mesh.positions),
-                None => Ok(fair),
-            })
-            .map_err(MendError::patch(id))?;
-        budget.spend(welded.blocks.search_work())?;
-        // No point of the patch is farther from the rim than this.
-        let margin = fair.patch.beyond_rim();
-        let layers = Layers::near(&whole, &welded.blocks, &region, margin, &[]);
-        let fair = fair.clear_of(&layers, margin, budget)?;
+        let closed = |fairness: Fairness| -> Result<FairPatch, MendError> {
+            let fair = FairPatch::new(seen, fairness, work)
+                .and_then(|fair| match &smooth {
+                    Some(_) => fair.with_region_at(&region.mesh.positions),
+                    None => Ok(fair),
+                })
+                .map_err(MendError::patch(id))?;
+            budget.spend(welded.blocks.search_work())?;
+            // No point of the patch is farther from the rim than this.
+            let margin = fair.patch.beyond_rim();
+            let layers = Layers::near(&whole, &welded.blocks, &region, margin, &[]);
+            Ok(fair.clear_of(&layers, margin, budget)?)
+        };
+        let fair = match closed(Fairness::Curved) {
+            Ok(curved) if curved.patch.crossings <= FEW_CUTS => curved,
+            Err(MendError::Exhausted(exhausted)) => return Err(exhausted.into()),
+            curved => match (curved, closed(Fairness::Plain)) {
+                (_, Err(MendError::Exhausted(exhausted))) => return Err(exhausted.into()),
+                (Ok(curved), Ok(plain)) if plain.patch.crossings < curved.patch.crossings => plain,
+                (Ok(curved), _) => curved,
+                (Err(_), plain) => plain?,
+            },
+        };
         let hole = FairHole {
             id,
             denoised: smooth.is_some(),

@@ -74,14 +74,14 @@ impl<'a> LaidCloth<'a> {
             };
             let bytes = VERTEX * (region.vertices.len() + patch.positions.len());
             budget.hold(bytes)?;
-            let layout = FairLayout::of(patch, &region, &FlattenLimits::default(), budget)?;
+            let layout = FairLayout::of(patch, &region, 1.0, &FlattenLimits::default(), budget)?;
             budget.release(bytes);
             if let Some(layout) = layout {
                 let sources = region.faces.iter().map(|f| welded.source(scan, *f));
                 return Ok(Some(LaidCloth {
                     sources: sources.collect(),
                     region: Cow::Owned(region),
-                    flat: Cow::Owned(layout.region),
+                    flat: Cow::Owned(layout.region.flat),
                     patch_flat: Cow::Owned(layout.patch),
                 }));
             }

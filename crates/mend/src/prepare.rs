@@ -22,7 +22,7 @@ use darn_geometry::mesh::region::{self, BoundedMesh, Region, RegionError};
 use darn_geometry::mesh::sound_hole::SoundHole;
 use darn_geometry::mesh::spikes::spikes;
 use darn_geometry::misfit::{flaps, overlapping_lip};
-use darn_geometry::patch::{PatchError, PatchMesh};
+use darn_geometry::patch::{FairLayout, FairPatch, Fairness, PatchError, PatchMesh, PatchWork};
 use darn_geometry::polygon::extent;
 
 /// Share of the grid's side that the hole should take, so that hole and context share the grid as in training.
@@ -40,6 +40,10 @@ const TUBE_STRETCH: f64 = 1.05;
 const MAX_TRIES: usize = 4;
 /// Tries with more and more of the cloth at the rim left out.
 const MISFIT_SEARCHES: usize = 4;
+/// Largest lip that is left out, as a share of the region's faces: cloth that overlaps by more does so in the chart only.
+const LARGEST_LIP: f64 = 0.05;
+/// How much the shapes of triangles count that keep the sides of a hole apart, beside those of the cloth.
+const KEEPS_APART: f64 = 0.02;
 /// Prepares the hole of a loop, from the sound edge of its cloth: pieces at the rim that do not belong to it are left
 /// out. Where that gives no hole, from the rim as it was scanned.
 ///
@@ -199,11 +203,48 @@ impl Preparation<'_> {
                 Err(error) if tries < MAX_TRIES && may_shrink(&error) => reach *= SHRINK,
                 Err(error) if rim_crosses(&error) => {
                     let flat = self.flat_region(widest)?;
+                    let most = LARGEST_LIP * flat.region.faces.len() as f64;
                     let lip = || overlapping_lip(flat.seen(), &flat.chart, self.call.budget);
-                    return self.misfit(lip)?.map(Prepared::Misfit).ok_or(error);
+                    return match self.misfit(lip)? {
+                        Some(lip) if lip.len() as f64 <= most => Ok(Prepared::Misfit(lip)),
+                        _ => self.kept_apart(flat, error),
+                    };
                 }
                 outcome => return outcome,
             }
+        }
+    }
+
+    /// The hole of a region whose rim crosses itself in its chart, laid flat again with triangles in the hole that keep its sides apart.
+    ///
+    /// # Errors
+    /// `crossing`, the error of the first chart, where that gives no hole either; `Exhausted`.
+    fn kept_apart(&self, flat: FlatRegion, crossing: MendError) -> Result<Prepared, MendError> {
+        let (started, budget) = (Instant::now(), self.call.budget);
+        let work = PatchWork {
+            last: None,
+            options: &self.call.mender.limits.patch,
+            budget,
+        };
+        let seen = flat.seen();
+        let fair = match FairPatch::new(seen, Fairness::Plain, work) {
+            Ok(fair) => fair,
+            Err(PatchError::Exhausted(exhausted)) => return Err(exhausted.into()),
+            Err(_) => return Err(crossing),
+        };
+        let limits = &self.call.mender.limits.flatten;
+        let Some(layout) = FairLayout::of(&fair.patch, seen, KEEPS_APART, limits, budget)? else {
+            return Err(crossing);
+        };
+        let mut apart = FlatRegion {
+            chart: layout.region,
+            ..flat
+        };
+        apart.timings.flatten += milliseconds(started);
+        match self.sampled(apart) {
+            Ok(hole) => Ok(Prepared::Hole(Box::new(hole))),
+            Err(MendError::Exhausted(exhausted)) => Err(exhausted.into()),
+            Err(_) => Err(crossing),
         }
     }
 

@@ -219,6 +219,10 @@ mod tests {
         let inpainter = Inpainter::choose(&mender().networks, None, None).unwrap();
         let sound = hole.unedited(&inpainter, mender().into()).unwrap();
         assert_eq!(doubts(&sound.patch, &hole.region), Vec::<String>::new());
+        let mut taut = sound.patch.clone();
+        taut.flat.iter_mut().for_each(|p| *p *= 0.7);
+        let found = doubts(&taut, &hole.region);
+        assert!(found[0].contains("in the mean (limit 1.3)"), "{found:?}");
         let rough = |k: usize| 0.02 * ((k * 7919 % 11) as f64 / 5.0 - 1.0);
         let mut crumpled = sound.patch.clone();
         let rim = crumpled.rim.len();

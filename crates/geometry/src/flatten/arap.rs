@@ -49,7 +49,7 @@ impl<'a> ArapEnergy<'a> {
         for (face, triangle) in mesh.faces.iter().zip(rest) {
             for k in 0..3 {
                 let (a, b) = (face[k] as usize, face[(k + 1) % 3] as usize);
-                matrix.add_spring(a, b, triangle.cotangent[k]);
+                matrix.add_spring(a, b, triangle.weight * triangle.cotangent[k]);
             }
         }
         // The energy does not see translations: hold the first vertex where it is.
@@ -157,7 +157,7 @@ const FACE_WORK: u64 = 60;
 impl FaceSprings {
     fn of(triangle: &RestTriangle) -> FaceSprings {
         let edges = [0, 1, 2].map(|k| triangle.corners[(k + 1) % 3] - triangle.corners[k]);
-        let cotangents = triangle.cotangent;
+        let cotangents = triangle.cotangent.map(|c| triangle.weight * c);
         let constant = (0..3)
             .map(|k| 0.5 * cotangents[k] * edges[k].norm_squared())
             .sum();

@@ -59,10 +59,10 @@ pub(super) struct Stretch {
     pub max: f64,
 }
 
-/// The stretch of a layout of all vertices of a mesh.
-pub(super) fn stretch(mesh: &TriMesh, flat: &[Vec2]) -> Stretch {
+/// The stretch of some faces of a mesh in a layout of all its vertices.
+pub(super) fn stretch(mesh: &TriMesh, faces: &[[u32; 3]], flat: &[Vec2]) -> Stretch {
     let (mut sum, mut most, mut count) = (0.0, 1.0f64, 0usize);
-    for face in &mesh.faces {
+    for face in faces {
         for k in 0..3 {
             let (a, b) = (face[k] as usize, face[(k + 1) % 3] as usize);
             let length = (mesh.positions[a] - mesh.positions[b]).norm();

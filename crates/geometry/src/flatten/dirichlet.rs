@@ -86,6 +86,10 @@ impl DirichletEnergy<'_> {
             .sum()
     }
 
+    fn weight(&self, f: usize) -> f64 {
+        self.rest[f].weight * self.rest[f].area
+    }
+
     /// The energy of a layout; infinite when a face is flipped.
     fn energy(&self, flat: &[Vec2]) -> f64 {
         let of = |f: usize| {
@@ -95,7 +99,7 @@ impl DirichletEnergy<'_> {
                 return f64::INFINITY;
             }
             let square = j.norm_squared();
-            self.rest[f].area * (square + square / (det * det))
+            self.weight(f) * (square + square / (det * det))
         };
         (0..self.rest.len()).map(of).sum()
     }
@@ -121,9 +125,9 @@ impl DirichletEnergy<'_> {
                             weight[(r, d)] * self.gradients[f][k][c],
                         )
                     });
-                    matrix.add_square(&row, self.rest[f].area);
+                    matrix.add_square(&row, self.weight(f));
                     row.iter().for_each(|(i, coefficient)| {
-                        rhs[*i][0] += self.rest[f].area * coefficient * goal[(r, c)]
+                        rhs[*i][0] += self.weight(f) * coefficient * goal[(r, c)]
                     });
                 }
             }

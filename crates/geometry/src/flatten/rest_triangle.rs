@@ -11,6 +11,8 @@ pub(crate) struct RestTriangle {
     pub cotangent: [f64; 3],
     /// Area; at least a small share of the squared longest edge.
     pub area: f64,
+    /// How much its shape counts beside those of others.
+    pub weight: f64,
 }
 
 impl RestTriangle {
@@ -48,7 +50,13 @@ impl RestTriangle {
             corners,
             cotangent,
             area: 0.5 * doubled,
+            weight: 1.0,
         }
+    }
+
+    /// The same triangle, whose shape counts this much.
+    pub fn weighing(self, weight: f64) -> RestTriangle {
+        RestTriangle { weight, ..self }
     }
 
     /// Gradients gₖ of the three hat functions (linear, 1 at corner k and 0 at the others): the Jacobian of a map

@@ -37,6 +37,15 @@ const AT_REST: f64 = 0.05;
 /// least bending.
 const RUNAWAY: f64 = 3.0;
 
+/// What a fair surface is like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fairness {
+    /// Its curvature continues that of the cloth around.
+    Curved,
+    /// It bends as little as possible: less like cloth, and sound around rims whose triangles are slivers or folded.
+    Plain,
+}
+
 /// A fair patch, with what is needed to finish it and to continue attributes into it.
 pub struct FairPatch {
     /// The patch; without a chart its `flat` is empty.
@@ -51,9 +60,11 @@ impl FairPatch {
     /// of cloth around the rim suffice.
     ///
     /// # Errors
-    /// `RimCrosses` when the rim encloses nothing, `Singular` when triangles are degenerate; `Exhausted`.
+    /// `RimCrosses` when the rim encloses nothing, `Singular` when triangles are degenerate (a plain one: when they are no numbers);
+    /// `Exhausted`.
     pub fn new<'a>(
         region: &Region,
+        fairness: Fairness,
         work: impl Into<PatchWork<'a>>,
     ) -> Result<FairPatch, PatchError> {
         let PatchWork {
@@ -62,15 +73,15 @@ impl FairPatch {
         let rim: Vec<u32> = region.rim.iter().rev().copied().collect();
         let mut sheet = spanned(&rim, region, budget)?;
         let edge = median_edge(&region.mesh);
-        let fairing = Fairing::new(region, &rim, budget);
-        settle(&mut sheet, &fairing, edge, budget)?;
+        let fairing = Fairing::new(region, &rim, fairness, budget);
+        let bend = settle(&mut sheet, &fairing, edge, budget)?;
         let most = options.max_vertices;
         let fine = edge.max(spacing_for(sheet.area(), most));
         for step in 0..FINE_STEPS {
             if step < 2 {
                 sheet.remesh(fine, most, budget)?;
             }
-            fairing.step(&mut sheet, Bend::Continued)?;
+            fairing.step(&mut sheet, bend)?;
         }
         let Sheet { mesh, corners } = sheet;
         let held: Vec<u32> = (0..corners as u32).collect();
@@ -209,17 +220,20 @@ fn edge_normals(rim: &[u32], region: &Region) -> Vec<Vec3> {
 }
 
 /// Finds the surface with few vertices: first the one of least bending, then the one with continued curvature, unless
-/// that grows out of all proportion.
+/// that grows out of all proportion or is not asked for. Gives the bend that it has.
 fn settle(
     sheet: &mut Sheet,
     fairing: &Fairing,
     edge: f64,
     budget: &Budget,
-) -> Result<(), PatchError> {
+) -> Result<Bend, PatchError> {
     let spacing = |sheet: &Sheet| edge.max(spacing_for(sheet.area(), COARSE));
     for _ in 0..2 {
         sheet.remesh(spacing(sheet), 2 * COARSE, budget)?;
         fairing.step(sheet, Bend::Least)?;
+    }
+    if fairing.fairness == Fairness::Plain {
+        return Ok(Bend::Least);
     }
     let (least, extent) = (sheet.clone(), extent(sheet));
     for _ in 0..COARSE_STEPS {
@@ -228,13 +242,13 @@ fn settle(
         let moved = fairing.step(sheet, Bend::Continued)?;
         if self::extent(sheet) > RUNAWAY * extent {
             *sheet = least;
-            return Ok(());
+            return Ok(Bend::Least);
         }
         if moved <= AT_REST * length {
             break;
         }
     }
-    Ok(())
+    Ok(Bend::Continued)
 }
 
 /// Edge length of even triangles with this many inner vertices on this area.

@@ -33,7 +33,7 @@ mod triangulate;
 mod untangle;
 
 pub use energy::StrainOptions;
-pub use fair::{FairLayout, FairPatch};
+pub use fair::{FairLayout, FairPatch, Fairness};
 pub use last_strain::LastStrain;
 pub use metric::{PatchMetric, log_stretch};
 pub use plan::{PatchMesh, PatchPlan, median_edge, plan, stretch_limit};

@@ -1,9 +1,9 @@
-//! A fair patch and the cloth around it laid flat together, to place a texture in.
+//! A fair patch and the cloth around it laid flat together: to place a texture in, and to keep apart what lies on both sides of a hole.
 
 use darn_budget::{Budget, Exhausted};
 
 use super::super::{Patch, quality};
-use crate::flatten::{FlattenError, FlattenLimits, flatten};
+use crate::flatten::{Chart, ClothFaces, FlattenError, FlattenLimits, UvSquare, flatten_cloth};
 use crate::mesh::loops::boundary_loops;
 use crate::mesh::region::Region;
 use crate::mesh::topology::Topology;
@@ -12,23 +12,25 @@ use crate::mesh::{TriMesh, Vec2};
 /// A patch and its region in one plane, scene units; faces are counter-clockwise. What encloses curvature is stretched.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FairLayout {
-    /// One point per vertex of the region.
-    pub region: Vec<Vec2>,
+    /// The region.
+    pub region: Chart,
     /// One point per vertex of the patch.
     pub patch: Vec<Vec2>,
-    /// Mean over edges of max(r, 1/r), r = flat length ÷ scene length.
-    pub stretch_mean: f64,
 }
 
 impl FairLayout {
     /// Lays out a patch with a region around its hole, whose rim has the same vertices in the same order. `None` where the two together are
     /// no disk once holes in the region are closed, or cannot be laid flat within the limits.
     ///
+    /// `weight` is how much the patch's shape counts beside the region's. None of its triangles is turned over, however little it counts: so
+    /// the rim does not cross itself.
+    ///
     /// # Errors
     /// `Exhausted`.
     pub fn of(
         patch: &Patch,
         region: &Region,
+        weight: f64,
         limits: &FlattenLimits,
         budget: &Budget,
     ) -> Result<Option<FairLayout>, Exhausted> {
@@ -43,17 +45,25 @@ impl FairLayout {
         let Some(whole) = disk(quality::joined(&patch, region), region.reach) else {
             return Ok(None);
         };
-        let chart = match flatten(&whole, limits, budget) {
+        let cloth = ClothFaces {
+            count: region.mesh.faces.len(),
+            weight_of_others: weight,
+        };
+        let chart = match flatten_cloth(&whole, cloth, limits, budget) {
             Ok(chart) => chart,
             Err(FlattenError::Exhausted(exhausted)) => return Err(exhausted),
             Err(_) => return Ok(None),
         };
         let own = region.mesh.positions.len();
         let rim = patch.rim.iter().map(|v| chart.flat[*v as usize]);
+        let flat = chart.flat[..own].to_vec();
         Ok(Some(FairLayout {
             patch: rim.chain(chart.flat[own..].iter().copied()).collect(),
-            region: chart.flat[..own].to_vec(),
-            stretch_mean: chart.stretch_mean,
+            region: Chart {
+                frame: UvSquare::tightest(&flat),
+                flat,
+                ..chart
+            },
         }))
     }
 }

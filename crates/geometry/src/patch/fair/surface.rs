@@ -7,6 +7,7 @@
 
 use darn_budget::Budget;
 
+use super::Fairness;
 use super::remesh::Sheet;
 use crate::cholesky::Symmetric;
 use crate::flatten::RestTriangle;
@@ -33,6 +34,8 @@ pub(super) struct Fairing<'a> {
     /// Per region vertex its Laplacian along its normal (twice the mean curvature, 1 / scene unit), smoothed; `None` on
     /// borders.
     bends: Vec<Option<f64>>,
+    /// What the surface is to be like.
+    pub fairness: Fairness,
     budget: &'a Budget<'a>,
 }
 
@@ -45,7 +48,7 @@ pub(super) enum Bend {
     Continued,
 }
 
-/// The discrete Laplacian of a mesh: cotangent weights and lumped areas.
+/// The discrete Laplacian of a mesh: weights and lumped areas.
 struct Laplacian {
     /// Per vertex its neighbours with their weights, then itself with minus their sum.
     rows: Vec<Vec<(u32, f64)>>,
@@ -54,9 +57,14 @@ struct Laplacian {
 
 impl<'a> Fairing<'a> {
     /// Measures the cloth around a hole; `rim` holds the region vertices of the rim, in the order of the sheets to come.
-    pub fn new(region: &'a Region, rim: &'a [u32], budget: &'a Budget<'a>) -> Fairing<'a> {
+    pub fn new(
+        region: &'a Region,
+        rim: &'a [u32],
+        fairness: Fairness,
+        budget: &'a Budget<'a>,
+    ) -> Fairing<'a> {
         let mesh = &region.mesh;
-        let (laplacian, closed) = (Laplacian::of(mesh), closed_fans(mesh));
+        let (laplacian, closed) = (Laplacian::cotangent(mesh), closed_fans(mesh));
         let normals = vertex_normals(mesh);
         let bend = |v: usize| {
             let along = laplacian.at(v, &mesh.positions).dot(&normals[v]);
@@ -81,6 +89,7 @@ impl<'a> Fairing<'a> {
             region,
             rim,
             bends,
+            fairness,
             budget,
         }
     }
@@ -93,7 +102,10 @@ impl<'a> Fairing<'a> {
     pub fn step(&self, sheet: &mut Sheet, bend: Bend) -> Result<f64, PatchError> {
         let joined = self.joined(sheet);
         self.budget.spend(FACE_WORK * joined.faces.len() as u64)?;
-        let laplacian = Laplacian::of(&joined);
+        let laplacian = match self.fairness {
+            Fairness::Curved => Laplacian::cotangent(&joined),
+            Fairness::Plain => Laplacian::uniform(&joined),
+        };
         let closed = closed_fans(&joined);
         let held = self.region.mesh.positions.len();
         let free = joined.positions.len() - held;
@@ -203,14 +215,33 @@ impl<'a> Fairing<'a> {
 }
 
 impl Laplacian {
-    fn of(mesh: &TriMesh) -> Laplacian {
-        let count = mesh.positions.len();
-        let mut rows: Vec<Vec<(u32, f64)>> = vec![Vec::new(); count];
-        let mut areas = vec![0.0; count];
-        for (face, rest) in mesh.faces.iter().zip(RestTriangle::of(mesh)) {
+    fn cotangent(mesh: &TriMesh) -> Laplacian {
+        let mut areas = vec![0.0; mesh.positions.len()];
+        let rest = RestTriangle::of(mesh);
+        for (face, rest) in mesh.faces.iter().zip(&rest) {
+            face.iter()
+                .for_each(|v| areas[*v as usize] += rest.area / 3.0);
+        }
+        let weight = |f: usize, k: usize| 0.5 * rest[f].cotangent[k].clamp(-SHARPEST, SHARPEST);
+        Self::weighted(mesh, weight, areas)
+    }
+
+    /// All neighbours weigh the same and all vertices have the same area, whatever the shapes of triangles.
+    fn uniform(mesh: &TriMesh) -> Laplacian {
+        Self::weighted(mesh, |_, _| 0.5, vec![1.0; mesh.positions.len()])
+    }
+
+    /// The Laplacian with these weights of the edges from corner k of a face to the next, which add up for both faces.
+    fn weighted(
+        mesh: &TriMesh,
+        weight_of: impl Fn(usize, usize) -> f64,
+        areas: Vec<f64>,
+    ) -> Laplacian {
+        let mut rows: Vec<Vec<(u32, f64)>> = vec![Vec::new(); mesh.positions.len()];
+        for (f, face) in mesh.faces.iter().enumerate() {
             for k in 0..3 {
                 let (a, b) = (face[k], face[(k + 1) % 3]);
-                let weight = 0.5 * rest.cotangent[k].clamp(-SHARPEST, SHARPEST);
+                let weight = weight_of(f, k);
                 for (from, to) in [(a, b), (b, a)] {
                     let row = &mut rows[from as usize];
                     match row.iter_mut().find(|(v, _)| *v == to) {
@@ -218,7 +249,6 @@ impl Laplacian {
                         None => row.push((to, weight)),
                     }
                 }
-                areas[face[k] as usize] += rest.area / 3.0;
             }
         }
         for (v, row) in (0u32..).zip(&mut rows) {

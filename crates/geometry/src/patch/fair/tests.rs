@@ -5,14 +5,14 @@ use std::f64::consts::{PI, TAU};
 use darn_budget::Budget;
 
 use super::*;
-use crate::flatten::FlattenLimits;
+use crate::flatten::{FlattenLimits, flatten};
 use crate::mesh::index::LoopId;
 use crate::mesh::loops::{BoundaryLoop, boundary_loops};
-use crate::mesh::region::{BoundedMesh, collar};
+use crate::mesh::region::{BoundedMesh, collar, region_around_hole};
 use crate::mesh::shapes::{sheet, tube};
 use crate::mesh::topology::Topology;
 use crate::mesh::weld::weld;
-use crate::patch::PatchOptions;
+use crate::patch::{PatchOptions, plan};
 
 /// The fair patch of the loop that `chosen` likes best, largest first.
 fn patched(soup: &TriMesh, chosen: impl Fn(&BoundaryLoop) -> f64) -> Patch {
@@ -27,7 +27,8 @@ fn patched(soup: &TriMesh, chosen: impl Fn(&BoundaryLoop) -> f64) -> Patch {
     let best = |a: &&BoundaryLoop, b: &&BoundaryLoop| chosen(a).total_cmp(&chosen(b));
     let rim: LoopId = loops.iter().max_by(best).expect("a loop").id;
     let region = collar(&whole, rim, 0.0, Budget::unlimited()).expect("a collar");
-    let fair = FairPatch::new(&region, &PatchOptions::default()).expect("a patch");
+    let fair =
+        FairPatch::new(&region, Fairness::Curved, &PatchOptions::default()).expect("a patch");
     let fair = fair.clear_of(&Layers::default(), 0.0, Budget::unlimited());
     let patch = fair.expect("no limits").patch;
     for (v, p) in patch.rim.iter().zip(&patch.positions) {
@@ -141,14 +142,18 @@ fn laid_out(soup: &TriMesh, reach: f64) -> Option<FairLayout> {
     let rim = best.expect("a loop").id;
     let never = Budget::unlimited();
     let narrow = collar(&whole, rim, 0.0, never).expect("a collar");
-    let patch = FairPatch::new(&narrow, &PatchOptions::default());
+    let patch = FairPatch::new(&narrow, Fairness::Curved, &PatchOptions::default());
     let patch = patch.expect("a patch").patch;
     let region = collar(&whole, rim, reach, never).expect("a collar");
-    let layout = FairLayout::of(&patch, &region, &FlattenLimits::default(), never);
+    let layout = FairLayout::of(&patch, &region, 1.0, &FlattenLimits::default(), never);
     let layout = layout.expect("no limits")?;
-    assert_eq!(layout.region.len(), region.mesh.positions.len());
+    assert_eq!(layout.region.flat.len(), region.mesh.positions.len());
     assert_eq!(layout.patch.len(), patch.positions.len());
-    let rim = region.rim.iter().rev().map(|v| layout.region[*v as usize]);
+    let rim = region
+        .rim
+        .iter()
+        .rev()
+        .map(|v| layout.region.flat[*v as usize]);
     assert!(rim.eq(layout.patch[..patch.rim.len()].iter().copied()));
     for face in &patch.faces {
         let [a, b, c] = face.map(|v| layout.patch[v as usize]);
@@ -161,12 +166,66 @@ fn laid_out(soup: &TriMesh, reach: f64) -> Option<FairLayout> {
 fn the_cap_of_a_sphere_is_laid_flat_with_the_cloth_around_it_as_far_as_that_goes() {
     let gentle = laid_out(&open_sphere(48, 0.5), 0.3).expect("a layout");
     assert!(
-        (1.0..1.1).contains(&gentle.stretch_mean),
+        (1.0..1.1).contains(&gentle.region.stretch_mean),
         "{}",
-        gentle.stretch_mean
+        gentle.region.stretch_mean
     );
     let half = laid_out(&open_sphere(48, 1.0), 0.4).expect("a layout");
-    assert!(half.stretch_mean > gentle.stretch_mean);
+    assert!(half.region.stretch_mean > gentle.region.stretch_mean);
     // All of the sphere but its other end cannot be laid flat.
     assert!(laid_out(&open_sphere(48, 0.5), 2.5).is_none());
+}
+
+#[test]
+fn a_plain_surface_is_flatter_than_the_cloth_around_it() {
+    for cap in [0.3, 0.8, 1.2] {
+        let mesh = weld(&open_sphere(48, cap)).mesh;
+        let topology = Topology::new(&mesh);
+        let loops = boundary_loops(&mesh, &topology);
+        let whole = BoundedMesh {
+            mesh: &mesh,
+            topology: &topology,
+            loops: &loops,
+        };
+        let top = (loops.iter()).max_by(|a, b| a.centroid.z.total_cmp(&b.centroid.z));
+        let never = Budget::unlimited();
+        let region = collar(&whole, top.expect("a loop").id, 0.0, never).expect("a collar");
+        let plain = FairPatch::new(&region, Fairness::Plain, &PatchOptions::default());
+        let plain = plain
+            .expect("a patch")
+            .clear_of(&Layers::default(), 0.0, never);
+        let patch = plain.expect("no limits").patch;
+        assert_eq!(patch.crossings, 0);
+        let heights = patch.positions.iter().map(|p| p.z);
+        let highest = heights.fold(f64::NEG_INFINITY, f64::max);
+        assert!((cap.cos()..1.02).contains(&highest), "{cap}: {highest}");
+    }
+}
+
+#[test]
+fn sides_of_a_slit_that_cross_in_the_chart_are_kept_apart() {
+    let options = PatchOptions::default();
+    let (limits, never) = (FlattenLimits::default(), Budget::unlimited());
+    // A slit one square wide, in a flat sheet and in a saddle.
+    for (bend, crosses) in [(0.0, false), (6.0, true)] {
+        let keep = |u: f64, v: f64| (u - 0.5).abs() > 0.36 || (v - 0.5).abs() > 0.01;
+        let place =
+            |u: f64, v: f64| Vec3::new(u, v, bend * ((u - 0.5).powi(2) - (v - 0.5).powi(2)));
+        let region = region_around_hole(&weld(&sheet(61, keep, place)).mesh, f64::INFINITY);
+        let chart = flatten(&region, &limits, never).expect("a chart");
+        assert_eq!(plan(&region, &chart, &options).is_err(), crosses);
+        let fair = FairPatch::new(&region, Fairness::Plain, &options);
+        let patch = fair.expect("a patch").patch;
+        let apart = FairLayout::of(&patch, &region, 0.02, &limits, never);
+        let apart = apart.expect("no limits").expect("a layout").region;
+        assert!(plan(&region, &apart, &options).is_ok());
+        assert_eq!(apart.flipped, 0);
+        assert!(apart.stretch_mean - chart.stretch_mean < 0.1);
+        if !crosses {
+            let off = |k: usize| {
+                (apart.flat[k] - apart.flat[0]).norm() - (chart.flat[k] - chart.flat[0]).norm()
+            };
+            assert!((0..chart.flat.len()).all(|k| off(k).abs() < 1e-3));
+        }
+    }
 }
