@@ -1,41 +1,61 @@
 //! The files of the jobs: inputs, results, reports.
 //!
-//! A file appears whole or not at all, and is on disk before a row names it: it is written under a temporary name, synced, renamed, and its
-//! folder is synced. It is deleted after no row names it. A crash between two of these steps leaves a file without a row, never a row without
-//! its file; [`Blobs::unnamed`] finds such files. For many machines the folder is on storage that all of them mount.
-//!
-//! ```text
-//! FOLDER/incoming/NAME      being written
-//! FOLDER/blobs/3f/NAME      whole; the folder is the first two digits of the job's id
-//! ```
+//! A file appears whole or not at all, and is on disk before a row names it. It is deleted after no row names it. A crash between two of these
+//! steps leaves a file without a row, never a row without its file; [`Blobs::unnamed`] finds such files. For many machines the files are in a
+//! folder that all of them mount, or in storage that speaks S3. Callers do not know which.
 
+mod bucket;
+mod file;
+mod folder;
 mod name;
+#[cfg(feature = "s3")]
+mod objects;
 
-use std::{
-    io,
-    path::{Path, PathBuf},
-    time::{Duration, SystemTime},
-};
+use std::{fmt, path::PathBuf, pin::Pin, time::Duration};
 
 use sha2::{Digest, Sha256};
-use tokio::{
-    fs::{self, File},
-    io::{AsyncRead, AsyncReadExt, AsyncWriteExt},
-    task::spawn_blocking,
-};
-use uuid::Uuid;
+use tokio::io::{AsyncRead, AsyncReadExt};
 
 use super::error::JobError;
+pub use bucket::{Bucket, InvalidBucket};
+pub use file::BlobFile;
+use folder::Folder;
 pub use name::BlobName;
+#[cfg(feature = "s3")]
+use objects::Objects;
 
 /// Bytes that are read and written at once.
 const CHUNK: usize = 256 << 10;
 
-/// A folder of files.
+/// Where files are.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Files {
+    /// In a folder, as this machine sees it.
+    Folder(PathBuf),
+    /// In storage that speaks S3; takes the crate's feature `s3`.
+    Bucket(Bucket),
+}
+
+impl fmt::Display for Files {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Folder(folder) => folder.display().fmt(f),
+            Self::Bucket(bucket) => bucket.fmt(f),
+        }
+    }
+}
+
+/// The files of the jobs.
 #[derive(Debug, Clone)]
 pub struct Blobs {
-    whole: PathBuf,
-    incoming: PathBuf,
+    storage: Storage,
+}
+
+#[derive(Debug, Clone)]
+enum Storage {
+    Folder(Folder),
+    #[cfg(feature = "s3")]
+    Objects(Objects),
 }
 
 /// What is known of a file that was written.
@@ -48,192 +68,117 @@ pub struct Written {
 }
 
 impl Blobs {
-    /// Opens the files of a folder, which is made where it is missing.
-    pub async fn open(folder: &Path) -> Result<Self, JobError> {
-        let whole = folder.join("blobs");
-        let incoming = folder.join("incoming");
-        let made = {
-            let (whole, incoming) = (whole.clone(), incoming.clone());
-            in_background(move || {
-                std::fs::create_dir_all(&incoming)?;
-                for first in 0..=u8::MAX {
-                    std::fs::create_dir_all(whole.join(format!("{first:02x}")))?;
-                }
-                sync_folder(&whole)?;
-                sync_folder(whole.parent().unwrap_or(&whole))
-            })
+    /// Opens the files of a place: a folder is made where it is missing; a bucket must be there, and is tried.
+    ///
+    /// # Errors
+    /// [`JobError::File`], which names the place, where it cannot be written to and read from.
+    pub async fn open(files: &Files) -> Result<Self, JobError> {
+        let storage = match files {
+            Files::Folder(folder) => Storage::Folder(Folder::open(folder).await?),
+            #[cfg(feature = "s3")]
+            Files::Bucket(bucket) => Storage::Objects(Objects::open(bucket).await?),
+            #[cfg(not(feature = "s3"))]
+            Files::Bucket(bucket) => {
+                let missing = "this program was built without the feature `s3`";
+                let error = std::io::Error::new(std::io::ErrorKind::Unsupported, missing);
+                return Err(JobError::file(|| format!("cannot use {bucket}"), error));
+            }
         };
-        made.await.map_err(|error| {
-            JobError::file(|| format!("cannot make {}", folder.display()), error)
-        })?;
-        Ok(Self { whole, incoming })
+        Ok(Self { storage })
     }
 
-    /// Writes a file from a stream. When this returns, the file is on disk under its name; where it fails or is dropped, nothing is left but,
-    /// after a crash, what [`Self::unnamed`] finds.
+    /// Writes a file from a stream. When this returns, the file is stored for good under its name; where it fails or is dropped, nothing is left
+    /// but what [`Self::unnamed`] finds: after a crash, and where storage did what it was asked and could not say so.
     ///
     /// # Errors
     /// [`JobError::StorageFull`] where the disk is full, [`JobError::Stream`] where the stream fails.
     pub async fn put(&self, name: &BlobName, content: impl AsyncRead) -> Result<Written, JobError> {
-        // Two writers of one name do not meet.
-        let temporary = Temporary {
-            path: self.incoming.join(format!("{name}-{}", Uuid::new_v4())),
-        };
-        let written = copy_to_disk(&temporary.path, content).await?;
-        let whole = self.path(name);
-        in_background(move || {
-            std::fs::rename(&temporary.path, &whole)?;
-            sync_folder(whole.parent().unwrap_or(&whole))
-        })
-        .await
-        .map_err(|error| JobError::file(|| format!("cannot rename {name}"), error))?;
-        Ok(written)
+        match &self.storage {
+            Storage::Folder(folder) => folder.put(name, content).await,
+            #[cfg(feature = "s3")]
+            Storage::Objects(objects) => objects.put(name, content).await,
+        }
     }
 
     /// Opens a file for reading.
     ///
     /// # Errors
     /// [`JobError::BlobMissing`] where it is not there.
-    pub async fn open_blob(&self, name: &BlobName) -> Result<File, JobError> {
-        File::open(self.path(name))
-            .await
-            .map_err(|error| match error.kind() {
-                io::ErrorKind::NotFound => JobError::BlobMissing(name.clone()),
-                _ => JobError::file(|| format!("cannot open {name}"), error),
-            })
+    pub async fn open_blob(&self, name: &BlobName) -> Result<BlobFile, JobError> {
+        match &self.storage {
+            Storage::Folder(folder) => folder.open_blob(name).await,
+            #[cfg(feature = "s3")]
+            Storage::Objects(objects) => objects.open_blob(name).await,
+        }
     }
 
     /// Deletes a file; one that is not there is deleted already.
     pub async fn delete(&self, name: &BlobName) -> Result<(), JobError> {
-        match fs::remove_file(self.path(name)).await {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                Err(JobError::file(|| format!("cannot delete {name}"), error))
-            }
-            _ => Ok(()),
+        match &self.storage {
+            Storage::Folder(folder) => folder.delete(name).await,
+            #[cfg(feature = "s3")]
+            Storage::Objects(objects) => objects.delete(name).await,
         }
     }
 
-    /// Like [`Self::delete`], for where nothing can be awaited.
-    pub(crate) fn delete_now(&self, name: &BlobName) -> io::Result<()> {
-        remove_if_there(&self.path(name))
+    /// Like [`Self::delete`], for where nothing can be awaited: at once in a folder, by a task where the storage is elsewhere. What cannot be
+    /// deleted is logged, and swept later.
+    pub(crate) fn delete_soon(&self, name: &BlobName) {
+        match &self.storage {
+            Storage::Folder(folder) => folder.delete_now(name),
+            #[cfg(feature = "s3")]
+            Storage::Objects(objects) => objects.delete_soon(name),
+        }
     }
 
     /// The whole files that are at least this old, for the caller to compare with the rows. Deletes what is left of writing that broke off
-    /// at least as long ago.
+    /// at least as long ago, where the storage can list that.
     ///
     /// The age keeps files whose row another process is just writing. It is counted by the clock of the storage, which need not be this machine's.
     pub async fn unnamed(&self, age: Duration) -> Result<Vec<BlobName>, JobError> {
-        let blobs = self.clone();
-        in_background(move || {
-            let limit = blobs.storage_time()?.checked_sub(age);
-            let is_old = |entry: &std::fs::DirEntry| -> io::Result<bool> {
-                match entry.metadata().and_then(|metadata| metadata.modified()) {
-                    Ok(modified) => Ok(limit.is_some_and(|limit| modified <= limit)),
-                    // Deleted or renamed since the folder was listed.
-                    Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
-                    Err(error) => Err(error),
-                }
-            };
-            for entry in std::fs::read_dir(&blobs.incoming)? {
-                let entry = entry?;
-                if is_old(&entry)? {
-                    remove_if_there(&entry.path())?;
-                }
-            }
-            let mut old = Vec::new();
-            for folder in std::fs::read_dir(&blobs.whole)? {
-                for entry in std::fs::read_dir(folder?.path())? {
-                    let entry = entry?;
-                    // Other files are not ours to delete.
-                    let name = entry.file_name().into_string().ok();
-                    if let Some(name) = name.and_then(|name| BlobName::parse(&name).ok())
-                        && is_old(&entry)?
-                    {
-                        old.push(name);
-                    }
-                }
-            }
-            Ok(old)
-        })
-        .await
-        .map_err(|error| JobError::file(|| "cannot list the files of the jobs".to_owned(), error))
-    }
-
-    /// The time by the clock of the storage: that of a file just made.
-    fn storage_time(&self) -> io::Result<SystemTime> {
-        let path = self.incoming.join(format!("clock-{}", Uuid::new_v4()));
-        let time = std::fs::File::create_new(&path)
-            .and_then(|file| file.metadata())
-            .and_then(|metadata| metadata.modified());
-        remove_if_there(&path)?;
-        time
-    }
-
-    fn path(&self, name: &BlobName) -> PathBuf {
-        let name = name.as_str();
-        self.whole.join(&name[..2]).join(name)
+        match &self.storage {
+            Storage::Folder(folder) => folder.unnamed(age).await,
+            #[cfg(feature = "s3")]
+            Storage::Objects(objects) => objects.unnamed(age).await,
+        }
     }
 }
 
-/// A file that is deleted when it is dropped.
-struct Temporary {
-    path: PathBuf,
+/// The stream of a file that is written, which counts and digests what it gives.
+struct Source<R> {
+    content: Pin<R>,
+    sha256: Sha256,
+    bytes: u64,
 }
 
-impl Drop for Temporary {
-    fn drop(&mut self) {
-        // What cannot be deleted is swept later.
-        let _ = std::fs::remove_file(&self.path);
+impl<R: std::ops::DerefMut<Target: AsyncRead>> Source<R> {
+    fn new(content: Pin<R>) -> Self {
+        Self {
+            content,
+            sha256: Sha256::new(),
+            bytes: 0,
+        }
     }
-}
 
-async fn copy_to_disk(path: &Path, content: impl AsyncRead) -> Result<Written, JobError> {
-    let failed = |error| JobError::file(|| format!("cannot write {}", path.display()), error);
-    let mut content = std::pin::pin!(content);
-    let mut file = File::create_new(path).await.map_err(failed)?;
-    let mut sha256 = Sha256::new();
-    let mut bytes = 0;
-    let mut chunk = Vec::with_capacity(CHUNK);
-    loop {
-        chunk.clear();
-        let mut part = (&mut content).take(CHUNK as u64);
-        while chunk.len() < CHUNK {
-            if part.read_buf(&mut chunk).await.map_err(JobError::Stream)? == 0 {
+    /// Adds up to [`CHUNK`] bytes to the buffer, and fewer only at the end of the stream. Answers with their number.
+    async fn read(&mut self, buffer: &mut Vec<u8>) -> Result<usize, JobError> {
+        let before = buffer.len();
+        let mut part = self.content.as_mut().take(CHUNK as u64);
+        while buffer.len() - before < CHUNK {
+            if part.read_buf(buffer).await.map_err(JobError::Stream)? == 0 {
                 break;
             }
         }
-        if chunk.is_empty() {
-            break;
+        let read = buffer.len() - before;
+        self.sha256.update(&buffer[before..]);
+        self.bytes += read as u64;
+        Ok(read)
+    }
+
+    fn written(self) -> Written {
+        Written {
+            bytes: self.bytes,
+            sha256: self.sha256.finalize().into(),
         }
-        sha256.update(&chunk);
-        bytes += chunk.len() as u64;
-        file.write_all(&chunk).await.map_err(failed)?;
     }
-    file.flush().await.map_err(failed)?;
-    file.sync_all().await.map_err(failed)?;
-    Ok(Written {
-        bytes,
-        sha256: sha256.finalize().into(),
-    })
-}
-
-/// Makes names that were added to a folder or taken from it last. Where the system has no such call, its file system does it by itself.
-fn sync_folder(folder: &Path) -> io::Result<()> {
-    if cfg!(unix) {
-        std::fs::File::open(folder)?.sync_all()?;
-    }
-    Ok(())
-}
-
-fn remove_if_there(path: &Path) -> io::Result<()> {
-    match std::fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
-        _ => Ok(()),
-    }
-}
-
-async fn in_background<T: Send + 'static>(
-    work: impl FnOnce() -> io::Result<T> + Send + 'static,
-) -> io::Result<T> {
-    spawn_blocking(work).await.map_err(io::Error::other)?
 }

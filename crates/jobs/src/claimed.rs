@@ -3,7 +3,6 @@
 use std::{sync::Arc, time::Duration};
 
 use tokio::{
-    fs::File,
     io::AsyncRead,
     runtime::Handle,
     task::JoinHandle,
@@ -13,7 +12,7 @@ use tracing::warn;
 
 use super::{
     attempt::{self, Attempt},
-    blobs::BlobName,
+    blobs::{BlobFile, BlobName},
     company::RunningJob,
     error::JobError,
     job::{Claimed, Failure, Job, Lease, Outcome, Product},
@@ -83,7 +82,7 @@ impl ClaimedJob {
     }
 
     /// Opens the input.
-    pub async fn input(&mut self) -> Result<File, JobError> {
+    pub async fn input(&mut self) -> Result<BlobFile, JobError> {
         self.phase = self.phase.max(Phase::Begun);
         // A waiting job has its input; it is gone where the job was deleted meanwhile.
         let input = self.job.input.as_ref();

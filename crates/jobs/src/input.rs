@@ -3,14 +3,13 @@
 use uuid::Uuid;
 
 use super::{
-    blobs::{BlobName, Blobs, Written},
+    blobs::{BlobFile, BlobName, Blobs, Written},
     error::JobError,
     jobs::Jobs,
 };
 use tokio::io::AsyncRead;
-use tracing::warn;
 
-/// An input that is on disk, for [`Jobs::submit_received`]. Dropped without that, its file is deleted.
+/// An input that is stored, for [`Jobs::submit_received`]. Dropped without that, its file is deleted.
 #[derive(Debug)]
 pub struct ReceivedInput {
     pub(crate) id: Uuid,
@@ -27,7 +26,7 @@ impl ReceivedInput {
     }
 
     /// Opens it for reading.
-    pub async fn open(&self) -> Result<tokio::fs::File, JobError> {
+    pub async fn open(&self) -> Result<BlobFile, JobError> {
         self.blobs.open_blob(&self.name).await
     }
 
@@ -42,10 +41,7 @@ impl Drop for ReceivedInput {
         if self.is_kept {
             return;
         }
-        // What cannot be deleted is swept later.
-        if let Err(error) = self.blobs.delete_now(&self.name) {
-            warn!(name = %self.name, ?error, "a file cannot be deleted");
-        }
+        self.blobs.delete_soon(&self.name);
     }
 }
 

@@ -1,15 +1,10 @@
 //! The jobs of a service: rows and files together.
 
-use std::{
-    fs::TryLockError,
-    path::{Path, PathBuf},
-    sync::Arc,
-    time::Duration,
-};
+use std::{fs::TryLockError, path::Path, sync::Arc, time::Duration};
 
 use sha2::{Digest, Sha256};
 use tokio::{
-    fs::{self, File},
+    fs,
     io::AsyncRead,
     sync::{
         Mutex, Notify,
@@ -21,61 +16,21 @@ use tracing::{error, warn};
 use uuid::Uuid;
 
 use super::{
-    blobs::{BlobName, Blobs},
+    blobs::{BlobFile, BlobName, Blobs, Files},
     claimed::ClaimedJob,
     company::RunningJobs,
     error::JobError,
     input::ReceivedInput,
     job::{
-        Claimant, ClientCounts, Job, ListQuery, NewJob, Page, Retention, RunningLimits, State,
-        Submission, Submitted,
+        Claimant, ClientCounts, Job, ListQuery, NewJob, Page, RunningLimits, State, Submission,
+        Submitted,
     },
-    store::{Clock, ExpiredLeases, Store},
+    place::{Place, Settings},
+    store::{ExpiredLeases, Store},
 };
 
 /// Changes that a listener may be behind before it only hears that there were some.
 const CHANGES_KEPT: usize = 1024;
-
-/// Where the jobs are.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Place {
-    /// All in one folder, rows in SQLite: for one process.
-    Folder(PathBuf),
-    /// Rows on a PostgreSQL server, files in a folder that all machines share.
-    Shared {
-        /// `postgres://user:password@host/database`
-        url: String,
-        /// The folder, as this machine mounts it.
-        folder: PathBuf,
-    },
-}
-
-/// How the jobs are kept.
-#[derive(Debug, Clone)]
-pub struct Settings {
-    /// After which time without a sign of life a worker counts as dead. The same on all machines.
-    pub lease: Duration,
-    /// How often a worker gives one.
-    pub renewal: Duration,
-    /// How often waiting jobs are looked for.
-    pub poll: Duration,
-    /// What is kept of finished jobs.
-    pub retention: Retention,
-    /// Where times come from; injected by tests.
-    pub clock: Clock,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            lease: Duration::from_secs(30),
-            renewal: Duration::from_secs(10),
-            poll: Duration::from_secs(1),
-            retention: Retention::default(),
-            clock: Clock::default(),
-        }
-    }
-}
 
 /// All jobs of a service.
 ///
@@ -107,13 +62,12 @@ impl Jobs {
     /// # Errors
     /// [`JobError::FolderInUse`] where another process has the folder.
     pub async fn open(place: &Place, settings: Settings) -> Result<Arc<Self>, JobError> {
-        let (Place::Folder(folder) | Place::Shared { folder, .. }) = place;
-        fs::create_dir_all(folder).await.map_err(|error| {
-            JobError::file(
-                || format!("cannot make the folder {}", folder.display()),
-                error,
-            )
-        })?;
+        let files = place.files();
+        if let Files::Folder(folder) = &files {
+            fs::create_dir_all(folder).await.map_err(|error| {
+                JobError::file(|| format!("cannot make the folder {files}"), error)
+            })?;
+        }
         let (lease, clock) = (settings.lease, settings.clock.clone());
         let (lock, store) = match place {
             Place::Folder(folder) => {
@@ -125,7 +79,7 @@ impl Jobs {
         let is_ours_alone = lock.is_some();
         let jobs = Arc::new(Self {
             store,
-            blobs: Blobs::open(folder).await?,
+            blobs: Blobs::open(&files).await?,
             settings,
             running: Arc::default(),
             claims: Mutex::default(),
@@ -237,12 +191,12 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobError::WrongState`] where it is not done, [`JobError::Expired`].
-    pub async fn result(&self, id: Uuid) -> Result<(Job, File), JobError> {
+    pub async fn result(&self, id: Uuid) -> Result<(Job, BlobFile), JobError> {
         self.open_file(id, |job| job.result.as_ref()).await
     }
 
     /// Opens the report of a job that is done; errors as [`Self::result`].
-    pub async fn report(&self, id: Uuid) -> Result<(Job, File), JobError> {
+    pub async fn report(&self, id: Uuid) -> Result<(Job, BlobFile), JobError> {
         self.open_file(id, |job| job.report.as_ref()).await
     }
 
@@ -250,7 +204,7 @@ impl Jobs {
         &self,
         id: Uuid,
         which: impl Fn(&Job) -> Option<&BlobName>,
-    ) -> Result<(Job, File), JobError> {
+    ) -> Result<(Job, BlobFile), JobError> {
         let job = self.store.get(id).await?;
         let Some(name) = which(&job) else {
             return Err(match job.expired_at {

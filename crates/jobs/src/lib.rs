@@ -98,6 +98,7 @@ mod housekeeping;
 mod input;
 mod job;
 mod jobs;
+mod place;
 mod reserve;
 mod store;
 
@@ -107,5 +108,6 @@ pub use delivery::{ClaimedDelivery, Delivery, DeliveryOutcome, TryOutcome};
 pub use error::JobError;
 pub use input::ReceivedInput;
 pub use job::*;
-pub use jobs::{Jobs, Place, Settings};
+pub use jobs::Jobs;
+pub use place::{Place, Settings};
 pub use store::{Clock, ExpiredLeases, Freed, Store};

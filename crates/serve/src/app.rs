@@ -9,7 +9,7 @@ use std::{
 };
 
 use axum::extract::Request;
-use darn_jobs::{Jobs, Place};
+use darn_jobs::Jobs;
 use tokio::time::timeout_at;
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
@@ -132,7 +132,7 @@ impl App {
     /// Opens the jobs and starts the workers; binds no socket.
     ///
     /// # Errors
-    /// The data folder cannot be used, or a thread cannot be started.
+    /// The database or the files cannot be used, or a thread cannot be started.
     pub async fn start(
         settings: &ServeArgs,
         mender: Arc<dyn Mender>,
@@ -140,8 +140,8 @@ impl App {
         let jobs = match settings.place() {
             Some(place) => {
                 let opened = Jobs::open(&place, darn_jobs::Settings::default()).await;
-                let (Place::Folder(folder) | Place::Shared { folder, .. }) = place;
-                Some(opened.map_err(|source| ServeError::Jobs { folder, source })?)
+                let files = place.files();
+                Some(opened.map_err(|source| ServeError::Jobs { files, source })?)
             }
             None => None,
         };

@@ -4,7 +4,10 @@ use std::{net::SocketAddr, ops::RangeInclusive, path::PathBuf, time::Duration};
 
 use clap::Args;
 
-use darn_jobs::Place;
+use darn_jobs::{
+    Place,
+    blobs::{Bucket, Files},
+};
 
 use super::{instance::InstanceName, telemetry::LogFormat, tls::TlsFiles, webhook::WebhookArgs};
 
@@ -58,19 +61,30 @@ pub struct ServeArgs {
     pub tls_handshake: Duration,
 
     /// Folder in which jobs are kept, which survive the process; left out, the service takes no jobs
-    #[arg(long, env = "DARN_DATA", value_name = "DIR")]
+    #[arg(long, env = "DARN_DATA", value_name = "DIR", group = "files")]
     pub data: Option<PathBuf>,
 
     /// PostgreSQL (15 or newer) that several processes share for their jobs, as `postgres://user:password@host/database`; the data folder
-    /// then is one that they all see, and has the files. Left out, the folder is this process's alone
+    /// then is one that they all see, and has the files, unless `--blobs` says where they are. Left out, the folder is this process's alone
     #[arg(
         long,
         env = "DARN_DATABASE",
         value_name = "URL",
-        requires = "data",
+        requires = "files",
         hide_env_values = true
     )]
     pub database: Option<String>,
+
+    /// Bucket of S3-compatible storage that has the files of jobs in place of a data folder, as `s3://BUCKET/PREFIX`, for this service alone; it takes
+    /// a database. Its address and credentials are in `AWS_ENDPOINT_URL`, `AWS_REGION`, `AWS_ACCESS_KEY_ID`, `AWS_SECRET_ACCESS_KEY` and so on
+    #[arg(
+        long,
+        env = "DARN_BLOBS",
+        value_name = "URL",
+        requires = "database",
+        group = "files"
+    )]
+    pub blobs: Option<Bucket>,
 
     /// Name of this process among those that serve together, 1 to 12 hexadecimal digits: the ids of its sessions begin with it. Left out,
     /// a random one
@@ -193,11 +207,17 @@ impl ServeArgs {
 
     /// Where the jobs are kept; `None` where none are.
     pub(crate) fn place(&self) -> Option<Place> {
-        let folder = self.data.clone()?;
-        Some(match self.database.clone() {
-            Some(url) => Place::Shared { url, folder },
-            None => Place::Folder(folder),
-        })
+        match (self.database.clone(), self.blobs.clone()) {
+            (Some(url), Some(bucket)) => Some(Place::Shared {
+                url,
+                files: Files::Bucket(bucket),
+            }),
+            (Some(url), None) => Some(Place::Shared {
+                url,
+                files: Files::Folder(self.data.clone()?),
+            }),
+            (None, _) => self.data.clone().map(Place::Folder),
+        }
     }
 
     /// The files of the certificate; `None` for plain connections.
@@ -427,6 +447,7 @@ mod tests {
         for bad in [
             ["--instance", "worker-1"],
             ["--database", "postgres://database"],
+            ["--blobs", "s3://scans/darn"],
             ["--queue", "99999999999999999999"],
             ["--queue", "65537"],
             ["--uploads", "0"],
@@ -439,6 +460,30 @@ mod tests {
                 "{bad:?}"
             );
         }
+    }
+
+    #[test]
+    fn files_of_jobs_are_in_one_place() {
+        let place = |options: &[&str]| {
+            let settings = Command::try_parse_from([&["darn"], options].concat());
+            settings.map(|settings| settings.serve.place())
+        };
+        let database = ["--database", "postgres://database"];
+        let bucket = ["--blobs", "s3://scans/darn/"];
+        let folder = ["--data", "shared"];
+        let found = place(&[database, bucket].concat()).unwrap().unwrap();
+        assert_eq!(found.files().to_string(), "s3://scans/darn");
+        let found = place(&[database, folder].concat()).unwrap().unwrap();
+        assert_eq!(found.files().to_string(), "shared");
+        // A bucket without a database would have nobody who keeps a second process out.
+        for bad in [
+            &[folder, bucket].concat()[..],
+            &[database, folder, bucket].concat(),
+        ] {
+            assert!(place(bad).is_err(), "{bad:?}");
+        }
+        let error = place(&[database, ["--blobs", "https://scans"]].concat()).unwrap_err();
+        assert!(error.to_string().contains("must be s3://BUCKET"), "{error}");
     }
 
     #[test]

@@ -171,7 +171,7 @@ pub enum RequestError {
     )]
     WebhooksOff,
     /// The disk is full.
-    #[error("the disk on which this service keeps jobs is full (DARN_DATA)")]
+    #[error("the storage in which this service keeps jobs is full (DARN_DATA, DARN_BLOBS)")]
     StorageFull,
     /// Too many jobs wait.
     #[error(

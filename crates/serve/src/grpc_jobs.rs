@@ -7,11 +7,8 @@ use std::{
 };
 
 use bytes::Bytes;
-use darn_jobs::{Jobs, ListQuery, State};
-use tokio::{
-    fs::File,
-    io::{AsyncRead as _, AsyncReadExt as _, ReadBuf},
-};
+use darn_jobs::{Jobs, ListQuery, State, blobs::BlobFile};
+use tokio::io::{AsyncRead as _, AsyncReadExt as _, ReadBuf};
 use tonic::{
     Request, Response, Status, Streaming,
     codegen::tokio_stream::{Stream, wrappers::ReceiverStream},
@@ -273,7 +270,7 @@ fn unreadable(error: &std::io::Error) -> RequestError {
 pub struct FileChunks {
     /// Until it is sent.
     report: Option<v1::Report>,
-    file: File,
+    file: BlobFile,
     piece: Vec<u8>,
 }
 

@@ -11,10 +11,9 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use bytes::Bytes;
-use darn_jobs::Jobs;
+use darn_jobs::{Jobs, blobs::BlobFile};
 use hyper::body::Frame;
 use tokio::{
-    fs::File,
     io::{AsyncRead as _, AsyncReadExt as _, ReadBuf},
     task,
 };
@@ -52,11 +51,11 @@ pub async fn result(
         if tag.is_some_and(|tag| entity_tag::is_known(headers, tag)) {
             return Ok((StatusCode::NOT_MODIFIED, not_modified(answer)).into_response());
         }
-        return alone(file, answer).await;
+        return Ok(alone(file, answer));
     }
     let (_, report) = jobs.report(id).await?;
     // Once as they are read, once in the answer.
-    let bytes = 2 * (length(&file).await? + length(&report).await?);
+    let bytes = 2 * (file.bytes() + report.bytes());
     let memory = take(
         &app.limits.memory,
         usize::try_from(bytes).unwrap_or(usize::MAX),
@@ -80,7 +79,7 @@ pub async fn report(jobs: &Jobs, id: Uuid) -> Result<Response, RequestError> {
         (header::CONTENT_TYPE, HeaderValue::from_static(JSON)),
         (header::CACHE_CONTROL, HeaderValue::from_static("no-store")),
     ];
-    alone(file, HeaderMap::from_iter(headers)).await
+    Ok(alone(file, HeaderMap::from_iter(headers)))
 }
 
 /// What is said of a file that is not sent, as the caller has it (RFC 9110, section 15.4.5).
@@ -89,16 +88,12 @@ fn not_modified(mut headers: HeaderMap) -> HeaderMap {
     headers
 }
 
-async fn alone(file: File, mut headers: HeaderMap) -> Result<Response, RequestError> {
-    headers.insert(header::CONTENT_LENGTH, length(&file).await?.into());
-    Ok((headers, Body::new(FileBody { file })).into_response())
+fn alone(file: BlobFile, mut headers: HeaderMap) -> Response {
+    headers.insert(header::CONTENT_LENGTH, file.bytes().into());
+    (headers, Body::new(FileBody { file })).into_response()
 }
 
-async fn length(file: &File) -> Result<u64, RequestError> {
-    Ok(file.metadata().await.map_err(unreadable)?.len())
-}
-
-async fn read(mut file: File) -> Result<Vec<u8>, RequestError> {
+async fn read(mut file: BlobFile) -> Result<Vec<u8>, RequestError> {
     let mut bytes = Vec::new();
     file.read_to_end(&mut bytes).await.map_err(unreadable)?;
     Ok(bytes)
@@ -111,7 +106,7 @@ fn unreadable(error: std::io::Error) -> RequestError {
 
 /// A file that is read as it is sent. It does not tell its length, since what tells one counts as memory that is held; the header does.
 struct FileBody {
-    file: File,
+    file: BlobFile,
 }
 
 impl hyper::body::Body for FileBody {

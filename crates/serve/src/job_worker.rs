@@ -244,8 +244,7 @@ impl JobWorker {
 
     async fn read_input(&self, claimed: &mut ClaimedJob) -> Result<Bytes, RequestError> {
         let mut file = claimed.input().await?;
-        let length = file.metadata().await.map_err(unreadable)?.len();
-        let length = usize::try_from(length).unwrap_or(usize::MAX);
+        let length = usize::try_from(file.bytes()).unwrap_or(usize::MAX);
         let memory = take(&self.app.limits.memory, length)?;
         let mut scan = Vec::with_capacity(length);
         file.read_to_end(&mut scan).await.map_err(unreadable)?;

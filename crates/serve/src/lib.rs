@@ -81,7 +81,6 @@ use std::{
     io,
     net::SocketAddr,
     num::NonZero,
-    path::PathBuf,
     sync::Arc,
     thread,
     time::{Duration, Instant},
@@ -107,6 +106,7 @@ pub use self::{
 };
 use self::{connections::Listener, job_worker::JobWorker};
 use darn_contract::{error_chain, port::Mender};
+use darn_jobs::blobs::Files;
 
 /// How often metric samples are aggregated and idle sessions ended.
 const UPKEEP_INTERVAL: Duration = Duration::from_secs(5);
@@ -143,11 +143,11 @@ pub enum ServeError {
         "a process without workers (--workers 0, DARN_WORKERS) hands all its work to others: it needs the database that it shares with them (--database, DARN_DATABASE)"
     )]
     AloneWithoutWorkers,
-    /// The folder or the database of the jobs cannot be used.
-    #[error("the jobs in {} cannot be opened: {}", .folder.display(), error_chain(.source))]
+    /// The files or the database of the jobs cannot be used.
+    #[error("the jobs in {files} cannot be opened: {}", error_chain(.source))]
     Jobs {
-        /// The folder of the settings (DARN_DATA).
-        folder: PathBuf,
+        /// The place of the files in the settings (DARN_DATA, DARN_BLOBS).
+        files: Files,
         /// Why not.
         source: darn_jobs::JobError,
     },

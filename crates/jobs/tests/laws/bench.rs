@@ -1,6 +1,7 @@
-//! Jobs to test on, over either database, with a clock that a test sets.
+//! Jobs to test on, over either database and either storage of files, with a clock that a test sets.
 
 use std::{
+    path::PathBuf,
     sync::{
         Arc,
         atomic::{AtomicI64, Ordering},
@@ -10,12 +11,14 @@ use std::{
 
 use darn_jobs::{
     Claimant, Claimed, Clock, Company, Failure, Job, Jobs, Outcome, Place, Product, Retention,
-    Settings, Store, Submission, blobs::BlobName,
+    Settings, Store, Submission,
+    blobs::{BlobName, Files},
 };
 use tempfile::TempDir;
+use tokio::time::{sleep, timeout};
 use uuid::Uuid;
 
-use super::postgres::Server;
+use super::{postgres::Server, s3::S3};
 
 /// Makes two tests of a law, one over each database.
 macro_rules! law {
@@ -39,16 +42,44 @@ macro_rules! law {
 }
 pub(crate) use law;
 
+/// Makes three tests of a law about files: with a folder over each database, and with S3.
+macro_rules! law_of_files {
+    (async fn $name:ident($bench:ident: Bench) $body:block) => {
+        mod $name {
+            use super::*;
+
+            async fn law($bench: Bench) $body
+
+            #[tokio::test]
+            async fn on_sqlite() {
+                law(Bench::new(crate::bench::Engine::Sqlite).await).await;
+            }
+
+            #[tokio::test]
+            async fn on_postgres() {
+                law(Bench::new(crate::bench::Engine::Postgres).await).await;
+            }
+
+            #[tokio::test]
+            async fn on_postgres_and_s3() {
+                law(Bench::new(crate::bench::Engine::PostgresAndS3).await).await;
+            }
+        }
+    };
+}
+pub(crate) use law_of_files;
+
 /// The lease of all benches.
 pub const LEASE: Duration = Duration::from_secs(30);
 /// Longer than a lease, in milliseconds.
 pub const PAST_LEASE: i64 = 31_000;
 
-/// One of the two databases.
+/// One of the two databases; with files in a folder, or in S3.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Engine {
     Sqlite,
     Postgres,
+    PostgresAndS3,
 }
 
 /// A place for jobs that is deleted in the end, and the clock of its jobs.
@@ -57,6 +88,8 @@ pub struct Bench {
     pub clock: TestClock,
     pub settings: Settings,
     pub folder: TempDir,
+    /// Where the files are, if that is S3.
+    pub s3: Option<S3>,
 }
 
 /// A clock that stands still until it is set forward.
@@ -81,11 +114,15 @@ impl Bench {
     pub async fn new(engine: Engine) -> Self {
         let folder = TempDir::new().unwrap();
         let path = folder.path().join("data");
+        let s3 = (engine == Engine::PostgresAndS3).then(|| S3::start(folder.path().join("s3")));
         let place = match engine {
             Engine::Sqlite => Place::Folder(path),
-            Engine::Postgres => Place::Shared {
+            Engine::Postgres | Engine::PostgresAndS3 => Place::Shared {
                 url: Server::shared().database().await,
-                folder: path,
+                files: match &s3 {
+                    Some(s3) => Files::Bucket(s3.bucket()),
+                    None => Files::Folder(path),
+                },
             },
         };
         let clock = TestClock::new();
@@ -102,6 +139,7 @@ impl Bench {
             clock,
             settings,
             folder,
+            s3,
         }
     }
 
@@ -112,13 +150,30 @@ impl Bench {
             .unwrap()
     }
 
+    /// The file, or the object as the server keeps it, at a path such as `incoming/x`.
+    pub fn path(&self, path: &str) -> PathBuf {
+        let root = match &self.s3 {
+            Some(s3) => s3.objects(),
+            None => self.folder.path().join("data"),
+        };
+        root.join(path)
+    }
+
+    /// Puts a file there that the jobs know nothing of.
+    pub fn plant(&self, path: &str, text: &str) {
+        let path = self.path(path);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, text).unwrap();
+    }
+
     /// The names of all files, whole ones and others.
     pub fn files(&self) -> Vec<String> {
-        let data = self.folder.path().join("data");
-        let mut names = Vec::new();
-        let mut folders = vec![data.join("blobs"), data.join("incoming")];
+        let mut names = self.s3.as_ref().map(S3::unfinished).unwrap_or_default();
+        let mut folders = vec![self.path("blobs"), self.path("incoming")];
         while let Some(folder) = folders.pop() {
-            for entry in std::fs::read_dir(folder).unwrap() {
+            // The server makes them when they are needed.
+            let entries = std::fs::read_dir(folder).into_iter().flatten();
+            for entry in entries {
                 let entry = entry.unwrap();
                 if entry.file_type().unwrap().is_dir() {
                     folders.push(entry.path());
@@ -130,6 +185,19 @@ impl Bench {
         names.sort();
         names
     }
+}
+
+/// Far longer than anything takes that a test waits for.
+pub const SOON: Duration = Duration::from_secs(10);
+
+/// Waits until something is so.
+pub async fn until<F: Future<Output = bool>>(is_so: impl Fn() -> F) {
+    let waited = timeout(SOON, async {
+        while !is_so().await {
+            sleep(Duration::from_millis(10)).await;
+        }
+    });
+    waited.await.expect("it becomes so");
 }
 
 /// A submission of a client.

@@ -12,9 +12,12 @@ use darn_jobs::{
     JobError, Jobs, ListQuery, Outcome, Place, Product, Retention, State, Submitted,
     blobs::BlobName,
 };
-use tokio::io::{AsyncRead, AsyncReadExt, ReadBuf};
+use tokio::{
+    io::{AsyncRead, AsyncReadExt, ReadBuf},
+    time::timeout,
+};
 
-use crate::bench::{Bench, Engine, claim, failed, law, submission, submit};
+use crate::bench::{Bench, Engine, claim, failed, law_of_files, submission, submit, until};
 
 /// The files that rows name.
 async fn named(jobs: &Jobs) -> Vec<String> {
@@ -42,11 +45,11 @@ async fn reopen(bench: &Bench) -> std::sync::Arc<Jobs> {
     jobs
 }
 
-law! {
+law_of_files! {
     async fn a_crash_between_two_steps_leaves_nothing_behind_and_loses_nothing(bench: Bench) {
         let jobs = bench.open().await;
         // Submitting: while the input is received, and between its rename and its row.
-        std::fs::write(bench.folder.path().join("data/incoming/torn"), "half a sc").unwrap();
+        bench.plant("incoming/torn", "half a sc");
         jobs.blobs().put(&BlobName::input(crate::bench::nobody()), &b"scan"[..]).await.unwrap();
         // Finishing: between the result's rename and the row, and between the row and the deletion of the input.
         let unfinished = submit(&jobs, "a").await.id;
@@ -85,18 +88,17 @@ law! {
     }
 }
 
-law! {
+law_of_files! {
     async fn files_that_are_young_or_not_ours_are_not_swept(bench: Bench) {
         let jobs = bench.open().await;
-        let foreign = bench.folder.path().join("data/blobs/00/README");
-        std::fs::write(&foreign, "not ours").unwrap();
+        bench.plant("blobs/00/README", "not ours");
         // Another machine is between the rename and the row.
         let input = BlobName::input(crate::bench::nobody());
         jobs.blobs().put(&input, &b"scan"[..]).await.unwrap();
         assert_eq!(jobs.sweep(Duration::from_secs(60)).await.unwrap(), 0);
         jobs.blobs().open_blob(&input).await.unwrap();
         assert_eq!(jobs.sweep(Duration::ZERO).await.unwrap(), 1);
-        assert!(foreign.exists());
+        assert!(bench.path("blobs/00/README").exists());
     }
 }
 
@@ -122,35 +124,45 @@ impl AsyncRead for Broken {
     }
 }
 
-/// A body that never ends.
-struct Stuck;
+/// A body that never ends, and gives nothing after some bytes.
+struct Stuck(usize);
 
 impl AsyncRead for Stuck {
     fn poll_read(
-        self: Pin<&mut Self>,
+        mut self: Pin<&mut Self>,
         _: &mut Context<'_>,
-        _: &mut ReadBuf<'_>,
+        buf: &mut ReadBuf<'_>,
     ) -> Poll<std::io::Result<()>> {
-        Poll::Pending
+        if self.0 == 0 {
+            return Poll::Pending;
+        }
+        let bytes = self.0.min(buf.remaining());
+        buf.put_slice(&vec![7; bytes]);
+        self.0 -= bytes;
+        Poll::Ready(Ok(()))
     }
 }
 
-law! {
+law_of_files! {
     async fn a_submission_that_breaks_off_leaves_nothing(bench: Bench) {
         let jobs = bench.open().await;
-        let broken = jobs.submit(submission("client"), Broken(1 << 20)).await;
-        assert!(matches!(broken, Err(JobError::Stream(_))), "{broken:?}");
-        let dropped = tokio::time::timeout(Duration::from_millis(50), jobs.submit(submission("client"), Stuck));
-        dropped.await.unwrap_err();
-        assert_eq!(bench.files(), [""; 0]);
+        // Within the first part of an upload, and after some.
+        for bytes in [0, 1 << 20, 12 << 20] {
+            let broken = jobs.submit(submission("client"), Broken(bytes)).await;
+            assert!(matches!(broken, Err(JobError::Stream(_))), "{broken:?}");
+            let dropped = jobs.submit(submission("client"), Stuck(bytes));
+            timeout(Duration::from_millis(300), dropped).await.unwrap_err();
+        }
+        // An upload is aborted by a task.
+        until(async || bench.files().is_empty()).await;
     }
 }
 
-law! {
+law_of_files! {
     async fn what_went_in_comes_out(bench: Bench) {
         let jobs = bench.open().await;
-        // Beside and across the size of the chunks that are written.
-        for bytes in [0, 1, (256 << 10) - 1, 256 << 10, (256 << 10) + 1, 3 << 20] {
+        // Beside and across the sizes of the chunks that are written, and of the parts of an upload.
+        for bytes in [0, 1, (256 << 10) - 1, 256 << 10, (256 << 10) + 1, 3 << 20, 5 << 20, (5 << 20) + 1, 11 << 20] {
             let input: Vec<u8> = (0..bytes).map(|place: u32| (place % 251) as u8).collect();
             let submitted = jobs.submit(submission("client"), &input[..]).await.unwrap();
             let Submitted::New(job) = submitted else { panic!("{submitted:?}") };
@@ -175,7 +187,7 @@ law! {
     }
 }
 
-law! {
+law_of_files! {
     async fn old_jobs_lose_their_files_and_then_their_rows(bench: Bench) {
         let mut bench = bench;
         bench.settings.retention = Retention { files_ms: 1000, rows_ms: 5000, ..Retention::default() };
@@ -204,7 +216,7 @@ law! {
     }
 }
 
-law! {
+law_of_files! {
     async fn the_caps_take_the_oldest_finished_jobs_first(bench: Bench) {
         let mut bench = bench;
         // Room for three inputs of four bytes, one of them of a job that waits; for four finished jobs.

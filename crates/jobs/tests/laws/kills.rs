@@ -9,7 +9,7 @@ use std::{
     time::Duration,
 };
 
-use darn_jobs::{CRASHED, Jobs, Place, Settings, State};
+use darn_jobs::{CRASHED, Jobs, Place, Settings, State, blobs::Files};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use tokio::io::AsyncReadExt;
 use uuid::Uuid;
@@ -25,6 +25,8 @@ const FEWEST_JOBS: usize = 10;
 
 /// Where the processes find what to do: in the folder in which they are started.
 const PLACE: &str = "place";
+/// The bucket, where there is one; how it is reached stands in their environment.
+const BUCKET: &str = "bucket";
 
 fn settings() -> Settings {
     Settings {
@@ -39,10 +41,17 @@ fn settings() -> Settings {
 /// The place that is written in a folder.
 fn place(folder: &Path) -> Place {
     let url = std::fs::read_to_string(folder.join(PLACE)).unwrap();
+    let bucket = std::fs::read_to_string(folder.join(BUCKET));
     let folder = folder.join("data");
     match url.is_empty() {
         true => Place::Folder(folder),
-        false => Place::Shared { url, folder },
+        false => Place::Shared {
+            url,
+            files: match bucket {
+                Ok(bucket) => Files::Bucket(bucket.parse().unwrap()),
+                Err(_) => Files::Folder(folder),
+            },
+        },
     }
 }
 
@@ -102,10 +111,14 @@ async fn work(jobs: Arc<Jobs>) {
     }
 }
 
-fn start(folder: &Path) -> Child {
-    Command::new(std::env::current_exe().unwrap())
+fn start(bench: &Bench) -> Child {
+    let mut command = Command::new(std::env::current_exe().unwrap());
+    if let Some(s3) = &bench.s3 {
+        command.envs(s3.settings());
+    }
+    command
         .args(["--exact", "kills::process", "--ignored", "--nocapture"])
-        .current_dir(folder)
+        .current_dir(bench.folder.path())
         .stdout(Stdio::piped())
         .spawn()
         .unwrap()
@@ -136,19 +149,22 @@ async fn what_is_acknowledged_survives(engine: Engine) {
         Place::Folder(_) => "",
         Place::Shared { url, .. } => url,
     };
-    let folder = bench.folder.path();
-    std::fs::write(folder.join(PLACE), url).unwrap();
+    std::fs::write(bench.folder.path().join(PLACE), url).unwrap();
+    if let Some(s3) = &bench.s3 {
+        let bucket = s3.bucket().to_string();
+        std::fs::write(bench.folder.path().join(BUCKET), bucket).unwrap();
+    }
     let seed = rand::random();
     println!("seed {seed}");
     let mut random = StdRng::seed_from_u64(seed);
     let mut jobs = BTreeMap::new();
     // On PostgreSQL another process always works on; only one may have a folder.
-    let mut other = (engine == Engine::Postgres).then(|| start(folder));
+    let mut other = (engine != Engine::Sqlite).then(|| start(&bench));
     // On a busy machine a process takes few jobs before it is killed: then more are.
     let mut kills = 0;
     while kills < KILLS || (jobs.len() < FEWEST_JOBS && kills < MOST_KILLS) {
         kills += 1;
-        let mut process = start(folder);
+        let mut process = start(&bench);
         std::thread::sleep(Duration::from_millis(random.random_range(50..500)));
         process.kill().unwrap();
         acknowledged(&mut process, &mut jobs);
@@ -156,10 +172,10 @@ async fn what_is_acknowledged_survives(engine: Engine) {
             && process.try_wait().unwrap().is_some()
         {
             acknowledged(process, &mut jobs);
-            *process = start(folder);
+            *process = start(&bench);
         }
     }
-    let mut last = vec![start(folder)];
+    let mut last = vec![start(&bench)];
     last.extend(other);
     for process in &mut last {
         acknowledged(process, &mut jobs);
@@ -207,4 +223,9 @@ async fn what_is_acknowledged_survives_on_sqlite() {
 #[tokio::test]
 async fn what_is_acknowledged_survives_on_postgres() {
     what_is_acknowledged_survives(Engine::Postgres).await;
+}
+
+#[tokio::test]
+async fn what_is_acknowledged_survives_on_postgres_and_s3() {
+    what_is_acknowledged_survives(Engine::PostgresAndS3).await;
 }

@@ -1,4 +1,5 @@
-//! The laws of durable jobs, each over SQLite and over PostgreSQL.
+//! The laws of durable jobs, each over SQLite and over PostgreSQL, and those of their files over S3, too.
+#![cfg(feature = "s3")]
 
 mod attempts;
 mod bench;
@@ -9,7 +10,9 @@ mod full_disk;
 mod instances;
 mod kills;
 mod model;
+mod objects;
 mod outbox;
 mod postgres;
 mod requests;
 mod running;
+mod s3;

@@ -6,21 +6,9 @@ use darn_jobs::{Failure, JobError, Place, Progress, State, StopReason, Submissio
 use sqlx::{Connection, PgConnection};
 use tokio::time::{sleep, timeout};
 
-use crate::bench::{Bench, Engine, law, submission, submit};
+use crate::bench::{Bench, Engine, SOON, law_of_files, submission, submit, until};
 
-const SOON: Duration = Duration::from_secs(10);
-
-/// Waits until something is so.
-async fn until<F: Future<Output = bool>>(is_so: impl Fn() -> F) {
-    let waited = timeout(SOON, async {
-        while !is_so().await {
-            sleep(Duration::from_millis(10)).await;
-        }
-    });
-    waited.await.expect("it becomes so");
-}
-
-law! {
+law_of_files! {
     async fn a_worker_waits_for_a_job_and_keeps_its_lease(bench: Bench) {
         let jobs = bench.open().await;
         let worker = tokio::spawn({
@@ -42,7 +30,7 @@ law! {
     }
 }
 
-law! {
+law_of_files! {
     async fn progress_and_the_end_are_news(bench: Bench) {
         let jobs = bench.open().await;
         let submitted = submit(&jobs, "client").await;
@@ -74,7 +62,7 @@ law! {
     }
 }
 
-law! {
+law_of_files! {
     async fn a_worker_hears_of_cancellation_and_of_deletion(bench: Bench) {
         let mut bench = bench;
         // The next renewal is far: the news is what it hears.
@@ -104,7 +92,7 @@ law! {
     }
 }
 
-law! {
+law_of_files! {
     async fn a_claim_that_nobody_takes_is_given_back(bench: Bench) {
         let jobs = bench.open().await;
         let id = submit(&jobs, "client").await.id;
@@ -122,7 +110,7 @@ law! {
     }
 }
 
-law! {
+law_of_files! {
     async fn poison_is_given_up_and_its_neighbours_succeed(bench: Bench) {
         let jobs = bench.open().await;
         let poison = Submission { name: Some("poison".to_owned()), ..submission("a") };
