@@ -15,7 +15,7 @@ use super::{
     blobs::{BlobFile, BlobName},
     company::RunningJob,
     error::JobError,
-    job::{Claimed, Failure, Job, Lease, Outcome, Product},
+    job::{Claimed, Failure, Job, Lease, Outcome, Product, State},
     jobs::{Changes, Jobs},
 };
 
@@ -173,6 +173,10 @@ impl ClaimedJob {
             self.phase = Phase::Ended;
             self.keeper.abort();
             match &ended {
+                Ok(job) if job.state == State::Waiting => {
+                    self.jobs.announce(job.id);
+                    self.jobs.announce_waiting();
+                }
                 Ok(job) => self.jobs.announce_end(job),
                 Err(_) => self.jobs.announce(self.job.id),
             }
@@ -193,7 +197,8 @@ impl Drop for ClaimedJob {
         let (jobs, lease) = (Arc::clone(&self.jobs), self.lease);
         self.runtime.spawn(async move {
             match jobs.store().end(lease, &Outcome::GivenBack).await {
-                Ok(_) | Err(JobError::LeaseLost(_)) => jobs.wake(),
+                Ok(_) => jobs.announce_waiting(),
+                Err(JobError::LeaseLost(_)) => jobs.wake(),
                 Err(error) => warn!(job = %lease.job, ?error, "a job cannot be given back"),
             }
         });

@@ -7,6 +7,7 @@ use tracing::{info, warn};
 
 use super::{
     error::JobError,
+    job::State,
     jobs::Jobs,
     store::{Chore, ExpiredLeases, Freed},
 };
@@ -64,7 +65,10 @@ impl Jobs {
         for job in &jobs {
             warn!(job = %job.id, attempt = job.attempt, worker = job.worker, state = %job.state, "a worker did not renew its lease");
             self.announce_end(job);
-            self.wake();
+            match job.state {
+                State::Waiting => self.announce_waiting(),
+                _ => self.wake(),
+            }
         }
         Ok(jobs.len())
     }

@@ -20,6 +20,7 @@ use super::{
     claimed::ClaimedJob,
     company::RunningJobs,
     error::JobError,
+    hints::Hints,
     input::ReceivedInput,
     job::{
         Claimant, ClientCounts, Job, ListQuery, NewJob, Page, RunningLimits, State, Submission,
@@ -43,7 +44,9 @@ pub struct Jobs {
     running: Arc<RunningJobs>,
     /// One claim at a time, so that it knows in what company its job starts.
     claims: Mutex<()>,
-    waiting: Notify,
+    waiting: Arc<Notify>,
+    /// Between the processes; there where others may be.
+    hints: Option<Hints>,
     /// An end waits that a webhook is to be told of.
     ended: Notify,
     changed: broadcast::Sender<Uuid>,
@@ -77,13 +80,16 @@ impl Jobs {
             Place::Shared { url, .. } => (None, Store::postgres(url, lease, clock).await?),
         };
         let is_ours_alone = lock.is_some();
+        let blobs = Blobs::open(&files).await?;
+        let waiting = Arc::new(Notify::new());
         let jobs = Arc::new(Self {
+            hints: store.start_hints(&waiting).await,
             store,
-            blobs: Blobs::open(&files).await?,
+            blobs,
             settings,
             running: Arc::default(),
             claims: Mutex::default(),
-            waiting: Notify::new(),
+            waiting,
             ended: Notify::new(),
             changed: broadcast::channel(CHANGES_KEPT).0,
             stopped: broadcast::channel(CHANGES_KEPT).0,
@@ -137,7 +143,7 @@ impl Jobs {
         input.keep();
         let created = self.store.create(&new).await;
         match &created {
-            Ok(Submitted::New(_)) => self.wake(),
+            Ok(Submitted::New(_)) => self.announce_waiting(),
             Ok(Submitted::Repeated(_))
             | Err(JobError::IdempotencyMismatch { .. } | JobError::StorageFull) => {
                 self.discard([&name]).await;
@@ -241,7 +247,7 @@ impl Jobs {
     pub async fn retry(&self, id: Uuid) -> Result<Job, JobError> {
         let job = self.store.retry(id).await?;
         self.announce(id);
-        self.wake();
+        self.announce_waiting();
         Ok(job)
     }
 
@@ -296,7 +302,7 @@ impl Jobs {
         }
     }
 
-    /// The next job: looks for one now, whenever this process has made one wait, and once a second. Safe to drop.
+    /// The next job: looks for one now, whenever a process has made one wait, and once a second. Safe to drop.
     ///
     /// While the database fails, this goes on trying, and logs why.
     pub async fn next_job(self: &Arc<Self>, worker: &str) -> ClaimedJob {
@@ -316,7 +322,7 @@ impl Jobs {
         }
     }
 
-    /// Waits until a job may wait that [`Self::claim`] has not seen: until this process makes one wait, at most a second.
+    /// Waits until a job may wait that [`Self::claim`] has not seen: until a process makes one wait, at most a second.
     pub async fn look_again(&self) {
         tokio::select! {
             () = self.waiting.notified() => {}
@@ -334,6 +340,9 @@ impl Jobs {
 
     /// Closes the connections to the database. Workers have ended, or given back, their jobs before.
     pub async fn close(&self) {
+        if let Some(hints) = &self.hints {
+            hints.end().await;
+        }
         self.store.close().await;
     }
 
@@ -363,6 +372,14 @@ impl Jobs {
     /// Lets a worker of this process look for a job.
     pub(crate) fn wake(&self) {
         self.waiting.notify_one();
+    }
+
+    /// Lets a worker of this process look for a job that now waits, and one of each other process.
+    pub(crate) fn announce_waiting(&self) {
+        self.wake();
+        if let Some(hints) = &self.hints {
+            hints.tell();
+        }
     }
 
     /// Tells this process that a job has changed.

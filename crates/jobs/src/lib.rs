@@ -94,6 +94,7 @@ mod company;
 mod delivery;
 mod engine;
 mod error;
+mod hints;
 mod housekeeping;
 mod input;
 mod job;

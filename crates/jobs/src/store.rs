@@ -18,13 +18,14 @@ use std::{
     time::{Duration, SystemTime, UNIX_EPOCH},
 };
 
-use tokio::sync::Mutex;
+use tokio::sync::{Mutex, Notify};
 use uuid::Uuid;
 
 use super::{
     blobs::BlobName,
     engine::{Engine, Row, Urgency, args, postgres::Postgres, sqlite::Sqlite},
     error::JobError,
+    hints::Hints,
     job::{
         ClientCounts, Failure, Job, ListQuery, NewJob, Page, Progress, State, Submission, Submitted,
     },
@@ -86,6 +87,14 @@ impl Store {
             clock,
             lease_ms: milliseconds(lease),
             claims: Mutex::new(()),
+        }
+    }
+
+    /// Listens for jobs that other processes make wait, where there are others.
+    pub(crate) async fn start_hints(&self, waiting: &Arc<Notify>) -> Option<Hints> {
+        match &self.engine {
+            Engine::Sqlite(_) => None,
+            Engine::Postgres(postgres) => Some(Hints::start(postgres.pool(), waiting).await),
         }
     }
 

@@ -54,6 +54,10 @@ impl Postgres {
         rows.iter().map(decode).collect()
     }
 
+    pub(crate) fn pool(&self) -> &PgPool {
+        &self.pool
+    }
+
     pub(crate) async fn close(&self) {
         self.pool.close().await;
     }

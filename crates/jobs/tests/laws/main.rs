@@ -7,6 +7,7 @@ mod claims;
 mod files;
 #[cfg(target_os = "linux")]
 mod full_disk;
+mod hints;
 mod instances;
 mod kills;
 mod model;

@@ -8,10 +8,8 @@ use std::{
 };
 
 use darn_jobs::blobs::Bucket;
-use hyper_util::{
-    rt::{TokioExecutor, TokioIo},
-    server::conn::auto::Builder,
-};
+use hyper::server::conn::http1;
+use hyper_util::rt::TokioIo;
 use s3s::{
     S3Result,
     access::{S3Access, S3AccessContext},
@@ -150,7 +148,7 @@ fn serve(listener: TcpListener, root: &Path, stopped: oneshot::Receiver<()>) {
             let (socket, _) = listener.accept().await.unwrap();
             let service = service.clone();
             tokio::spawn(async move {
-                let http = Builder::new(TokioExecutor::new());
+                let http = http1::Builder::new();
                 // Clients go away.
                 let _ = http.serve_connection(TokioIo::new(socket), service).await;
             });
