@@ -41,7 +41,7 @@ const MAX_TRIES: usize = 4;
 /// Tries with more and more of the cloth at the rim left out.
 const MISFIT_SEARCHES: usize = 4;
 /// Largest lip that is left out, as a share of the region's faces: cloth that overlaps by more does so in the chart only.
-const LARGEST_LIP: f64 = 0.05;
+const LARGEST_LIP: f64 = 0.12;
 /// How much the shapes of triangles count that keep the sides of a hole apart, beside those of the cloth.
 const KEEPS_APART: f64 = 0.02;
 /// Prepares the hole of a loop, from the sound edge of its cloth: pieces at the rim that do not belong to it are left
