@@ -40,8 +40,6 @@ const TUBE_STRETCH: f64 = 1.05;
 const MAX_TRIES: usize = 4;
 /// Tries with more and more of the cloth at the rim left out.
 const MISFIT_SEARCHES: usize = 4;
-/// Largest lip that is left out, as a share of the region's faces: cloth that overlaps by more does so in the chart only.
-const LARGEST_LIP: f64 = 0.12;
 /// How much the shapes of triangles count that keep the sides of a hole apart, beside those of the cloth.
 const KEEPS_APART: f64 = 0.02;
 /// Prepares the hole of a loop, from the sound edge of its cloth: pieces at the rim that do not belong to it are left
@@ -203,11 +201,10 @@ impl Preparation<'_> {
                 Err(error) if tries < MAX_TRIES && may_shrink(&error) => reach *= SHRINK,
                 Err(error) if rim_crosses(&error) => {
                     let flat = self.flat_region(widest)?;
-                    let most = LARGEST_LIP * flat.region.faces.len() as f64;
                     let lip = || overlapping_lip(flat.seen(), &flat.chart, self.call.budget);
                     return match self.misfit(lip)? {
-                        Some(lip) if lip.len() as f64 <= most => Ok(Prepared::Misfit(lip)),
-                        _ => self.kept_apart(flat, error),
+                        Some(lip) => Ok(Prepared::Misfit(lip)),
+                        None => self.kept_apart(flat, error),
                     };
                 }
                 outcome => return outcome,

@@ -7,16 +7,19 @@ use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 
 use crate::flatten::Chart;
-use crate::mesh::Vec2;
 use crate::mesh::index::FaceId;
 use crate::mesh::region::Region;
+use crate::mesh::{Vec2, Vec3};
 
 /// Edges by which the faces left out reach beyond the overlap.
 const WIDER: usize = 1;
+/// Faces of two lips that lie on each other are not farther apart than this many edges, centre from centre. Others cover each other in the chart only:
+/// no chart shows curved cloth as it is.
+const NEAR: f64 = 3.0;
 /// Nanoseconds of work a face or a pair of faces.
 const PAIR_WORK: u64 = 300;
 
-/// The faces of one lip that the other covers on the chart, and those beside them, ascending: of each two, the lip with
+/// The faces of one lip that the other covers on the chart and in space, and those beside them, ascending: of each two, the lip with
 /// the fewer such faces. Without them the rim does not cross itself, nor come so close to itself that a patch would have
 /// to be thin. Empty where nothing at the rim overlaps.
 ///
@@ -81,7 +84,7 @@ fn with_faces_beside(region: &Region, faces: &[u32]) -> Vec<u32> {
     (0..region.mesh.faces.len() as u32).filter(beside).collect()
 }
 
-/// Per face the faces that cover a part of it on the chart, ascending.
+/// Per face the faces that cover a part of it on the chart and lie near it in space, ascending.
 fn overlaps(region: &Region, chart: &Chart, budget: &Budget) -> Result<Vec<Vec<u32>>, Exhausted> {
     let faces = &region.mesh.faces;
     let triangle = |f: usize| faces[f].map(|v| chart.flat[v as usize]);
@@ -91,6 +94,18 @@ fn overlaps(region: &Region, chart: &Chart, budget: &Budget) -> Result<Vec<Vec<u
         AABB::from_corners([low.x, low.y], [high.x, high.y])
     };
     budget.spend(PAIR_WORK * faces.len() as u64)?;
+    // Centre and longest edge.
+    let places: Vec<(Vec3, f64)> = (0..faces.len())
+        .map(|f| {
+            let [a, b, c] = region.mesh.triangle(f);
+            let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
+            ((a + b + c) / 3.0, longest)
+        })
+        .collect();
+    let is_near = |f: usize, g: usize| {
+        let ((a, own), (b, other)) = (places[f], places[g]);
+        (a - b).norm() <= NEAR * own.max(other)
+    };
     let boxed = |f: usize| GeomWithData::new(Rectangle::from_aabb(envelope(f)), f as u32);
     let tree = RTree::bulk_load((0..faces.len()).map(boxed).collect());
     let mut steps = Steps::of(budget);
@@ -100,7 +115,7 @@ fn overlaps(region: &Region, chart: &Chart, budget: &Budget) -> Result<Vec<Vec<u
             steps.take(PAIR_WORK)?;
             let g = g.data as usize;
             let apart = faces[f].iter().all(|v| !faces[g].contains(v));
-            if apart && overlap(&triangle(f), &triangle(g)) {
+            if apart && is_near(f, g) && overlap(&triangle(f), &triangle(g)) {
                 over[f].push(g as u32);
             }
         }
