@@ -79,6 +79,8 @@ impl FairHole {
         };
         let fair = match closed(Fairness::Curved) {
             Ok(curved) if curved.patch.crossings <= FEW_CUTS => curved,
+            // Cloth that is a tangle cuts any surface.
+            Ok(curved) if curved.patch.crossings > curved.patch.faces.len() => curved,
             Err(MendError::Exhausted(exhausted)) => return Err(exhausted.into()),
             curved => match (curved, closed(Fairness::Plain)) {
                 (_, Err(MendError::Exhausted(exhausted))) => return Err(exhausted.into()),

@@ -40,6 +40,8 @@ const TUBE_STRETCH: f64 = 1.05;
 const MAX_TRIES: usize = 4;
 /// Tries with more and more of the cloth at the rim left out.
 const MISFIT_SEARCHES: usize = 4;
+/// Largest mean stretch of a chart with a crossing rim that is worth another try: what does not lie flat crosses itself in any chart.
+const WORTH_KEEPING: f64 = 1.15;
 /// How much the shapes of triangles count that keep the sides of a hole apart, beside those of the cloth.
 const KEEPS_APART: f64 = 0.02;
 /// Prepares the hole of a loop, from the sound edge of its cloth: pieces at the rim that do not belong to it are left
@@ -218,6 +220,9 @@ impl Preparation<'_> {
     /// `crossing`, the error of the first chart, where that gives no hole either; `Exhausted`.
     fn kept_apart(&self, flat: FlatRegion, crossing: MendError) -> Result<Prepared, MendError> {
         let (started, budget) = (Instant::now(), self.call.budget);
+        if flat.chart.stretch_mean > WORTH_KEEPING {
+            return Err(crossing);
+        }
         let work = PatchWork {
             last: None,
             options: &self.call.mender.limits.patch,

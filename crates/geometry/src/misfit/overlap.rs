@@ -15,7 +15,7 @@ use crate::mesh::{Vec2, Vec3};
 const WIDER: usize = 1;
 /// Faces of two lips that lie on each other are not farther apart than this many edges, centre from centre. Others cover each other in the chart only:
 /// no chart shows curved cloth as it is.
-const NEAR: f64 = 3.0;
+const NEAR: f64 = 1.25;
 /// Nanoseconds of work a face or a pair of faces.
 const PAIR_WORK: u64 = 300;
 
