@@ -165,6 +165,8 @@ fn cloth_torn_in_two_is_joined_by_its_candidate() {
         let named = Constraints::check(&message).expect("a tear that can be sent");
         let answer = mended(&bytes, &named).unwrap();
         assert_eq!(answer.report.holes.len(), 1, "{:?}", answer.report);
+        // Loops 0 and 1 are the edges of the two pieces.
+        assert_eq!(answer.report.holes[0].id, 2);
         let notes = &answer.report.holes[0].notes;
         assert!(
             answer

@@ -310,7 +310,17 @@ pub fn renumbered(
         true => near.old.clone(),
         false => BTreeSet::new(),
     };
-    let steps: [Candidates; 3] = [&untouched, &|near: &NearLoop| near.old.clone(), &beside];
+    // What a line closes is no loop that was there before, though it runs along the cloth's own edge.
+    let is_closed = |near: &NearLoop| {
+        near.pieces
+            .iter()
+            .any(|p| pieces.all[*p as usize].faces == 0)
+    };
+    let along = |near: &NearLoop| match is_closed(near) {
+        true => BTreeSet::new(),
+        false => near.old.clone(),
+    };
+    let steps: [Candidates; 3] = [&untouched, &along, &beside];
     for candidates in steps {
         for (id, near) in ids.iter_mut().zip(around) {
             if id.is_none() {
