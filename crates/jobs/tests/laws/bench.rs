@@ -20,9 +20,9 @@ use uuid::Uuid;
 
 use super::{postgres::Server, s3::S3};
 
-/// Makes two tests of a law, one over each database.
+/// Makes two tests of a law, one over each database; and others over the engines that are named after it.
 macro_rules! law {
-    (async fn $name:ident($bench:ident: Bench) $body:block) => {
+    (async fn $name:ident($bench:ident: Bench) $body:block $($test:ident: $engine:ident)*) => {
         mod $name {
             use super::*;
 
@@ -37,6 +37,12 @@ macro_rules! law {
             async fn on_postgres() {
                 law(Bench::new(crate::bench::Engine::Postgres).await).await;
             }
+            $(
+                #[tokio::test]
+                async fn $test() {
+                    law(Bench::new(crate::bench::Engine::$engine).await).await;
+                }
+            )*
         }
     };
 }
@@ -45,26 +51,7 @@ pub(crate) use law;
 /// Makes three tests of a law about files: with a folder over each database, and with S3.
 macro_rules! law_of_files {
     (async fn $name:ident($bench:ident: Bench) $body:block) => {
-        mod $name {
-            use super::*;
-
-            async fn law($bench: Bench) $body
-
-            #[tokio::test]
-            async fn on_sqlite() {
-                law(Bench::new(crate::bench::Engine::Sqlite).await).await;
-            }
-
-            #[tokio::test]
-            async fn on_postgres() {
-                law(Bench::new(crate::bench::Engine::Postgres).await).await;
-            }
-
-            #[tokio::test]
-            async fn on_postgres_and_s3() {
-                law(Bench::new(crate::bench::Engine::PostgresAndS3).await).await;
-            }
-        }
+        crate::bench::law! { async fn $name($bench: Bench) $body on_postgres_and_s3: PostgresAndS3 }
     };
 }
 pub(crate) use law_of_files;
