@@ -1,35 +1,13 @@
 // The editor in a real browser, with a real darn.
 
 import assert from 'node:assert/strict';
-import { after, before, test } from 'node:test';
 import axe from 'axe-core';
 import { sheetWithThreeHoles } from './fixtures.mjs';
-import { PATIENCE, openEditor, startBrowser, startService } from './browser.mjs';
-import { EXAMPLE, drop, saved, stateless } from './shared.mjs';
+import { EXAMPLE, drop, editorTests, saved, stateless } from './shared.mjs';
 
-let browser;
-let service;
+const inEditor = editorTests();
 
-before(async () => {
-  service = await startService();
-  browser = await startBrowser();
-});
-
-after(async () => {
-  await browser?.close();
-  service?.stop();
-});
-
-/** A test with a page of its own. */
-function inEditor(name, body, options) {
-  test(name, { timeout: 3 * PATIENCE }, async () => {
-    const editor = await openEditor(browser, service, options);
-    await body(editor, editor.page);
-    await editor.close();
-  });
-}
-
-inEditor('the example is opened, mended, grabbed, undone, redone and saved', async (editor, page) => {
+inEditor('the example is opened, mended, grabbed, undone, redone and saved', async (editor, page, service) => {
   await editor.openExample();
   await editor.keep('open');
   const renderer = await page.evaluate(() => {
@@ -78,7 +56,7 @@ inEditor('the example is opened, mended, grabbed, undone, redone and saved', asy
   assert.equal(await editor.model((it) => it.constraintsText()), constraints);
 });
 
-inEditor('other fills are stepped through by keyboard, undone and saved', async (editor, page) => {
+inEditor('other fills are stepped through by keyboard, undone and saved', async (editor, page, service) => {
   const fills = page.getByRole('group', { name: 'Fills' });
   const [previous, next] = ['Previous fill', 'Next fill'].map((name) => editor.button(name));
   // As they are drawn: on the example the fills lie closer together than a picture shows.
@@ -221,22 +199,25 @@ inEditor('everything can be done by keyboard', async (editor, page) => {
   assert.match(await page.getByRole('alert').textContent(), /reach/);
 });
 
-inEditor('a session that has ended is opened again, and the fill and the edits are there', async (editor, page) => {
-  await editor.openExample();
-  const opened = page.waitForResponse((answer) => answer.url().endsWith('/sessions') && answer.status() === 201);
-  await editor.mend();
-  const path = (await opened).headers().location;
-  await editor.tool('g');
-  await editor.drag(await editor.onCloth(), { x: 30, y: -20 });
-  await editor.button('Next fill').click();
-  await editor.idle();
-  assert.equal((await fetch(new URL(path, service.url), { method: 'DELETE' })).status, 204);
-  await editor.drag(await editor.onCloth(0.01, 0.02), { x: -20, y: 10 });
-  const constraints = await editor.model((it) => it.constraintsText());
-  const { edits, alternative } = JSON.parse(constraints);
-  assert.deepEqual([edits.length, alternative], [2, 1]);
-  assert.ok((await saved(editor, page)).bytes.equals(await stateless(service, constraints)));
-});
+inEditor(
+  'a session that has ended is opened again, and the fill and the edits are there',
+  async (editor, page, service) => {
+    await editor.openExample();
+    const opened = page.waitForResponse((answer) => answer.url().endsWith('/sessions') && answer.status() === 201);
+    await editor.mend();
+    const path = (await opened).headers().location;
+    await editor.tool('g');
+    await editor.drag(await editor.onCloth(), { x: 30, y: -20 });
+    await editor.button('Next fill').click();
+    await editor.idle();
+    assert.equal((await fetch(new URL(path, service.url), { method: 'DELETE' })).status, 204);
+    await editor.drag(await editor.onCloth(0.01, 0.02), { x: -20, y: 10 });
+    const constraints = await editor.model((it) => it.constraintsText());
+    const { edits, alternative } = JSON.parse(constraints);
+    assert.deepEqual([edits.length, alternative], [2, 1]);
+    assert.ok((await saved(editor, page)).bytes.equals(await stateless(service, constraints)));
+  },
+);
 
 inEditor('a busy service is waited for as long as it says', async (editor, page) => {
   await editor.openExample();
@@ -348,7 +329,7 @@ inEditor('B and the slider show the scan as it was', async (editor, page) => {
   assert.ok((await editor.difference(mended, await editor.picture())) < 0.002);
 });
 
-inEditor('the address of a scan in #scan= is opened', async (editor, page) => {
+inEditor('the address of a scan in #scan= is opened', async (editor, page, service) => {
   await page.goto(`${service.url}#scan=${encodeURIComponent(`${service.url}editor/scarf_hole.glb`)}`);
   await page.getByText('Holes (1)').waitFor();
 });

@@ -3,10 +3,31 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { repository } from './browser.mjs';
+import { after, before, test } from 'node:test';
+import { PATIENCE, openEditor, repository, startBrowser, startService } from './browser.mjs';
 
 export const EXAMPLE = readFileSync(join(repository, 'examples/scarf_hole.glb'));
 export const TEXTURED = readFileSync(join(repository, 'tests/textured.glb'));
+
+/** Starts a darn and a browser for the tests of a file; gives what makes a test with a page of its own. */
+export function editorTests() {
+  let browser;
+  let service;
+  before(async () => {
+    service = await startService();
+    browser = await startBrowser();
+  });
+  after(async () => {
+    await browser?.close();
+    service?.stop();
+  });
+  return (name, body, options) =>
+    test(name, { timeout: 3 * PATIENCE }, async () => {
+      const editor = await openEditor(browser, service, options);
+      await body(editor, editor.page, service);
+      await editor.close();
+    });
+}
 
 /** What one `POST /inpaint` of the same constraints answers. */
 export async function stateless(service, constraints, scan = EXAMPLE) {

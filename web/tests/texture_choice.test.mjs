@@ -1,35 +1,13 @@
 // Where the colour of new cloth comes from, chosen in a real browser with a real darn.
 
 import assert from 'node:assert/strict';
-import { after, before, test } from 'node:test';
 import axe from 'axe-core';
-import { PATIENCE, openEditor, startBrowser, startService } from './browser.mjs';
 import { sheetInColours } from './fixtures.mjs';
-import { TEXTURED, drop, saved, stateless } from './shared.mjs';
+import { TEXTURED, drop, editorTests, saved, stateless } from './shared.mjs';
 
-let browser;
-let service;
+const inEditor = editorTests();
 
-before(async () => {
-  service = await startService();
-  browser = await startBrowser();
-});
-
-after(async () => {
-  await browser?.close();
-  service?.stop();
-});
-
-/** A test with a page of its own. */
-function inEditor(name, body) {
-  test(name, { timeout: 3 * PATIENCE }, async () => {
-    const editor = await openEditor(browser, service);
-    await body(editor, editor.page);
-    await editor.close();
-  });
-}
-
-inEditor('new cloth gets one colour, which is seen, saved, undone and loaded', async (editor, page) => {
+inEditor('new cloth gets one colour, which is seen, saved, undone and loaded', async (editor, page, service) => {
   await drop(page, 'textured.glb', TEXTURED);
   await page.getByText('Holes (1)').waitFor();
   await editor.idle();

@@ -1,33 +1,11 @@
 // Cutting out, borders, heat maps, and the dots and maps of anchors, in a real browser with a real darn.
 
 import assert from 'node:assert/strict';
-import { after, before, test } from 'node:test';
 import axe from 'axe-core';
-import { PATIENCE, openEditor, startBrowser, startService } from './browser.mjs';
 import { sheetTornInTwo, sheetWithBite } from './fixtures.mjs';
-import { drop, saved, stateless } from './shared.mjs';
+import { drop, editorTests, saved, stateless } from './shared.mjs';
 
-let browser;
-let service;
-
-before(async () => {
-  service = await startService();
-  browser = await startBrowser();
-});
-
-after(async () => {
-  await browser?.close();
-  service?.stop();
-});
-
-/** A test with a page of its own. */
-function inEditor(name, body) {
-  test(name, { timeout: 3 * PATIENCE }, async () => {
-    const editor = await openEditor(browser, service);
-    await body(editor, editor.page);
-    await editor.close();
-  });
-}
+const inEditor = editorTests();
 
 /** The constraints of the present step. */
 async function constraintsOf(editor) {
@@ -41,7 +19,7 @@ async function complaints(page) {
   return violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join(' ')}`);
 }
 
-inEditor('damaged cloth is cut out by dragging a ball, mended, undone and put back', async (editor, page) => {
+inEditor('damaged cloth is cut out by dragging a ball, mended, undone and put back', async (editor, page, service) => {
   await editor.openExample();
   await editor.mend();
   await editor.tool('g');
@@ -146,7 +124,7 @@ inEditor('a cut is typed, refused where it cannot be, and changed', async (edito
 
 inEditor(
   'damaged cloth is cut out under a polygon of clicks, mended, undone and loaded again',
-  async (editor, page) => {
+  async (editor, page, service) => {
     await editor.openExample();
     const before = await editor.picture();
     await editor.tool('c');
@@ -225,7 +203,7 @@ inEditor(
   },
 );
 
-inEditor('cloth that is torn in two is shown, joined, and its edges can be typed', async (editor, page) => {
+inEditor('cloth that is torn in two is shown, joined, and its edges can be typed', async (editor, page, service) => {
   const scan = sheetTornInTwo();
   await drop(page, 'torn.glb', scan);
   await page.getByText('Bites, rips and tears at the border (1)').waitFor();
@@ -263,71 +241,76 @@ inEditor('cloth that is torn in two is shown, joined, and its edges can be typed
   assert.ok(bytes.equals(await stateless(service, JSON.stringify({ holes }), scan)));
 });
 
-inEditor('a bite at the border is shown, mended up to a new hem, and its hem is moved', async (editor, page) => {
-  const scan = sheetWithBite();
-  await drop(page, 'bite.glb', scan);
-  await page.getByText('Bites, rips and tears at the border (1)').waitFor();
-  await editor.idle();
-  const open = await editor.picture();
-  await page.getByRole('button', { name: 'Bite or rip 1' }).click();
-  await editor.idle();
-  assert.ok((await editor.difference(open, await editor.picture())) > 0.0005, 'the stretch is seen');
-  await editor.keep('border-stretch');
-  assert.deepEqual(await complaints(page), []);
-  await editor.button('Mend up to the new hem').click();
-  await editor.idle();
-  assert.equal(await page.getByRole('alert').count(), 0);
-  await editor.keep('border-mended');
-  assert.ok((await editor.difference(open, await editor.picture())) > 0.005, 'new cloth is seen');
-  const { holes } = await constraintsOf(editor);
-  assert.equal(holes.length, 1);
-  assert.equal(holes[0].border.from.length, 3);
-  const bytes = (await saved(editor, page)).bytes;
-  assert.ok(bytes.equals(await stateless(service, JSON.stringify({ holes }), scan)));
-  await editor.button('Undo').click();
-  await editor.idle();
+inEditor(
+  'a bite at the border is shown, mended up to a new hem, and its hem is moved',
+  async (editor, page, service) => {
+    const scan = sheetWithBite();
+    await drop(page, 'bite.glb', scan);
+    await page.getByText('Bites, rips and tears at the border (1)').waitFor();
+    await editor.idle();
+    const open = await editor.picture();
+    await page.getByRole('button', { name: 'Bite or rip 1' }).click();
+    await editor.idle();
+    assert.ok((await editor.difference(open, await editor.picture())) > 0.0005, 'the stretch is seen');
+    await editor.keep('border-stretch');
+    assert.deepEqual(await complaints(page), []);
+    await editor.button('Mend up to the new hem').click();
+    await editor.idle();
+    assert.equal(await page.getByRole('alert').count(), 0);
+    await editor.keep('border-mended');
+    assert.ok((await editor.difference(open, await editor.picture())) > 0.005, 'new cloth is seen');
+    const { holes } = await constraintsOf(editor);
+    assert.equal(holes.length, 1);
+    assert.equal(holes[0].border.from.length, 3);
+    const bytes = (await saved(editor, page)).bytes;
+    assert.ok(bytes.equals(await stateless(service, JSON.stringify({ holes }), scan)));
+    await editor.button('Undo').click();
+    await editor.idle();
 
-  // The same by hand: two clicks at the edge, and a point of the hem typed.
-  const places = await page.evaluate(() => {
-    const { shadowRoot } = document.querySelector('darn-editor');
-    const { viewer } = shadowRoot.querySelector('darn-stage');
-    const [{ border }] = document.querySelector('darn-editor').editor.scan.candidates;
-    const { left, top, width, height } = viewer.canvas.getBoundingClientRect();
-    const Vector = viewer.camera.position.constructor;
-    return [border.from, border.to].map((point) => {
-      const { x, y } = new Vector(...point).project(viewer.camera);
+    // The same by hand: two clicks at the edge, and a point of the hem typed.
+    const places = await page.evaluate(() => {
+      const { shadowRoot } = document.querySelector('darn-editor');
+      const { viewer } = shadowRoot.querySelector('darn-stage');
+      const [{ border }] = document.querySelector('darn-editor').editor.scan.candidates;
+      const { left, top, width, height } = viewer.canvas.getBoundingClientRect();
+      const Vector = viewer.camera.position.constructor;
+      return [border.from, border.to].map((point) => {
+        const { x, y } = new Vector(...point).project(viewer.camera);
+        return { x: left + ((x + 1) / 2) * width, y: top + ((1 - y) / 2) * height };
+      });
+    });
+    await editor.tool('e');
+    for (const { x, y } of places) {
+      await page.mouse.click(x, y);
+    }
+    const draft = await editor.model((it) => it.draft);
+    assert.equal(draft.kind, 'border');
+    const near = (a, b) => a.every((value, axis) => Math.abs(value - b[axis]) < 0.06);
+    assert.ok(near(draft.from, holes[0].border.from) && near(draft.to, holes[0].border.to));
+    await editor.button('Add a point of the hem').click();
+    await page.getByLabel('Hem 1 z').fill('0.05');
+    await page.keyboard.press('Tab');
+    assert.equal(await editor.model((it) => it.draft.along[0][2]), 0.05);
+    // Its handle is dragged, too.
+    const handle = { x: (places[0].x + places[1].x) / 2, y: (places[0].y + places[1].y) / 2 };
+    const before = await editor.model((it) => it.draft.along[0]);
+    const at = await page.evaluate(() => {
+      const { viewer } = document.querySelector('darn-editor').shadowRoot.querySelector('darn-stage');
+      const { left, top, width, height } = viewer.canvas.getBoundingClientRect();
+      const Vector = viewer.camera.position.constructor;
+      const { x, y } = new Vector(...document.querySelector('darn-editor').editor.draft.along[0]).project(
+        viewer.camera,
+      );
       return { x: left + ((x + 1) / 2) * width, y: top + ((1 - y) / 2) * height };
     });
-  });
-  await editor.tool('e');
-  for (const { x, y } of places) {
-    await page.mouse.click(x, y);
-  }
-  const draft = await editor.model((it) => it.draft);
-  assert.equal(draft.kind, 'border');
-  const near = (a, b) => a.every((value, axis) => Math.abs(value - b[axis]) < 0.06);
-  assert.ok(near(draft.from, holes[0].border.from) && near(draft.to, holes[0].border.to));
-  await editor.button('Add a point of the hem').click();
-  await page.getByLabel('Hem 1 z').fill('0.05');
-  await page.keyboard.press('Tab');
-  assert.equal(await editor.model((it) => it.draft.along[0][2]), 0.05);
-  // Its handle is dragged, too.
-  const handle = { x: (places[0].x + places[1].x) / 2, y: (places[0].y + places[1].y) / 2 };
-  const before = await editor.model((it) => it.draft.along[0]);
-  const at = await page.evaluate(() => {
-    const { viewer } = document.querySelector('darn-editor').shadowRoot.querySelector('darn-stage');
-    const { left, top, width, height } = viewer.canvas.getBoundingClientRect();
-    const Vector = viewer.camera.position.constructor;
-    const { x, y } = new Vector(...document.querySelector('darn-editor').editor.draft.along[0]).project(viewer.camera);
-    return { x: left + ((x + 1) / 2) * width, y: top + ((1 - y) / 2) * height };
-  });
-  assert.ok(Math.hypot(at.x - handle.x, at.y - handle.y) < 60);
-  await editor.drag(at, { x: 0, y: 8 });
-  assert.notDeepEqual(await editor.model((it) => it.draft.along[0]), before);
-  await editor.keep('border-hem');
-  await page.keyboard.press('Escape');
-  assert.equal(await editor.model((it) => it.draft), undefined);
-});
+    assert.ok(Math.hypot(at.x - handle.x, at.y - handle.y) < 60);
+    await editor.drag(at, { x: 0, y: 8 });
+    assert.notDeepEqual(await editor.model((it) => it.draft.along[0]), before);
+    await editor.keep('border-hem');
+    await page.keyboard.press('Escape');
+    assert.equal(await editor.model((it) => it.draft), undefined);
+  },
+);
 
 inEditor(
   'stretch and curvature are shown as colours with a legend, by keyboard, and follow the cloth',
