@@ -287,8 +287,14 @@ fn columns_of(part: &ScanPart, vertex: u32) -> Vec<f64> {
 /// Normals of the patch's vertices, of any length above 0. The scan's triangles around the patch count, too, so that the shading is
 /// continuous at the seam.
 pub fn vertex_normals_at_seam(patch: &Patch, region: &Region) -> Vec<Vec3> {
-    let all = vertex_normals(&quality::joined(patch, region));
+    let mut joined = quality::joined(patch, region);
     let inner = region.mesh.positions.len();
+    let mut of_patch = vec![false; joined.positions.len()];
+    of_patch[inner..].fill(true);
+    patch.rim.iter().for_each(|v| of_patch[*v as usize] = true);
+    // The other triangles around are many, and decide nothing here.
+    (joined.faces).retain(|face| face.iter().any(|v| of_patch[*v as usize]));
+    let all = vertex_normals(&joined);
     let rim = patch.rim.iter().map(|v| all[*v as usize]);
     let solid = |n: Vec3| if n.norm() > 0.0 { n } else { Vec3::z() };
     rim.chain(all[inner..].iter().copied()).map(solid).collect()

@@ -51,6 +51,8 @@ impl<'a> HoleContext<'a> {
         let pulls = constraints.pulls();
         let patch = if pulls.is_empty() {
             unedited.patch.clone()
+        } else if let Some(last) = unedited.pulled.of(&pulls, self.pace) {
+            last
         } else {
             let started = Instant::now();
             let moved = self.moved_fill(&constraints.moves())?;
@@ -58,6 +60,7 @@ impl<'a> HoleContext<'a> {
             let started = Instant::now();
             let patch = self.constrained_patch(&moved, &pulls)?;
             timings.patch += milliseconds(started);
+            unedited.pulled.keep(pulls, self.pace, &patch);
             patch
         };
         Ok(PatchDraft {
@@ -75,8 +78,7 @@ impl<'a> HoleContext<'a> {
     /// targets that lie far away is itself stretched.
     fn constrained_patch(&self, moved: &[Vec3], pulls: &[Pull]) -> Result<Patch, MendError> {
         let (hole, unedited) = (self.hole, &self.unedited);
-        let stretch = |patch: &Patch| quality::measure(patch, &hole.region).stretch_max;
-        let usual = stretch(&unedited.patch);
+        let usual = quality::stretch(&unedited.patch).most;
         let most = stretch_limit(usual);
         let pulls = PatchPulls {
             pulls,
@@ -92,7 +94,7 @@ impl<'a> HoleContext<'a> {
             let each = unedited.filled.iter().zip(moved);
             let filled: Vec<Vec3> = each.map(|(from, to)| from.lerp(to, share)).collect();
             let tried = patch(&filled)?;
-            let found = stretch(&tried);
+            let found = quality::stretch(&tried).most;
             if found <= most {
                 return Ok(tried);
             }

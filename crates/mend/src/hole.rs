@@ -7,6 +7,7 @@ use crate::confidence::{FillEvidence, smooth_deviations};
 use crate::edit::{HoleCells, ReachLimit};
 use crate::error::MendError;
 use crate::inpainter::{FillKey, Inpainter};
+use crate::last_pulled::LastPulled;
 use crate::mender::Call;
 use crate::moved_fill::LastHeldFill;
 use crate::network_share::WidenedHole;
@@ -90,8 +91,10 @@ pub struct UneditedCloth {
     pub deviations: Option<Vec<f64>>,
     /// What the network says of the cells that were moved last.
     pub held: LastHeldFill,
-    /// The last patch of a drag.
+    /// Where the last patch of a drag lay.
     pub strain: LastStrain,
+    /// The last patch that anything pulled at.
+    pub pulled: LastPulled,
     /// The patch made of it.
     pub patch: Patch,
     /// Milliseconds of the network.
@@ -183,6 +186,7 @@ impl Hole {
             deviations,
             held: LastHeldFill::default(),
             strain: LastStrain::default(),
+            pulled: LastPulled::default(),
             patch,
             net_ms,
             patch_ms: milliseconds(started),
@@ -332,7 +336,7 @@ impl UneditedCloths {
         let kept = self.lock();
         let each = kept.iter().map(|(_, u)| {
             let patch = 40 * u.patch.positions.len() + 12 * u.patch.faces.len();
-            (3 * 24 + 8) * CELLS + patch + u.strain.bytes()
+            (3 * 24 + 8) * CELLS + patch + u.strain.bytes() + u.pulled.bytes()
         });
         each.sum()
     }

@@ -39,6 +39,7 @@ mod hole_report;
 mod inpainter;
 mod islands;
 mod laid_cloth;
+mod last_pulled;
 mod limits;
 mod mender;
 mod moved_fill;

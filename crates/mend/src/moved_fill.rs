@@ -77,7 +77,7 @@ impl HoleContext<'_> {
                 let held = unedited.held.of(&cells);
                 let mut grids = vec![given(1.0)];
                 grids.extend(held.is_none().then(|| given(0.0)));
-                let answers = self.inpainter.fill(&grids, Averaging::HalfTurn)?;
+                let answers = self.inpainter.fill(&grids, Averaging::Once)?;
                 let mut answers = answers.iter().map(|a| hole.in_scene(&a.positions));
                 let moved = answers.next();
                 let held = held.or_else(|| Some(unedited.held.keep(cells, answers.next()?)));

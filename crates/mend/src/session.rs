@@ -328,7 +328,7 @@ mod tests {
             edits: vec![grab_at(None)],
             ..Constraints::default()
         };
-        for constraints in [opening, dragged] {
+        for constraints in [opening, dragged.clone()] {
             let call = session.call(never);
             let draft = call.draft(&constraints).unwrap();
             let (positions, _) = call.positions(&constraints).unwrap();
@@ -353,6 +353,11 @@ mod tests {
             // A tenth of an edge of the sheet, which has 24 squares a side.
             assert!(farthest < 0.1 / 24.0, "step {step}: {farthest}");
         }
+        // A draft leaves nothing behind that a whole answer would take for its own.
+        call.draft(&dragged).unwrap();
+        let kept = call.mended(&dragged).unwrap();
+        let single = crate::mend(&scan_of(&holed_sheet(24, 0.15)), &dragged, mender()).unwrap();
+        assert!(kept.bytes == single.bytes);
         let elsewhere = Constraints {
             anchors: vec![anchor_at(Some(77))],
             ..Constraints::default()

@@ -10,8 +10,6 @@ pub enum Averaging {
     Once,
     /// The grid as it is, mirrored in u, in v and in both: for a mend's result.
     Flips,
-    /// The grid as it is and mirrored in both u and v: for the updates of an edit session, which must be quick.
-    HalfTurn,
 }
 
 impl Averaging {
@@ -20,7 +18,6 @@ impl Averaging {
         match self {
             Averaging::Once => &[0],
             Averaging::Flips => &[0, 1, 2, 3],
-            Averaging::HalfTurn => &[0, 3],
         }
     }
 }

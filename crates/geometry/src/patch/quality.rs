@@ -21,14 +21,21 @@ pub struct Quality {
     pub self_intersections: usize,
 }
 
-/// Measures a patch against its chart, if it has one, and the region it closes.
-pub fn measure(patch: &Patch, region: &Region) -> Quality {
+/// How far the edges of a patch with an inner vertex are stretched: length ÷ length in the chart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stretch {
+    /// The mean; 1 without such edges or a chart.
+    pub mean: f64,
+    /// The maximum of the same.
+    pub most: f64,
+}
+
+/// Measures how far a patch is stretched.
+pub fn stretch(patch: &Patch) -> Stretch {
     let (mut edges, mut sum, mut most) = (0usize, 0.0, 0.0f64);
-    let mut area = 0.0;
     for face in &patch.faces {
         let p = face.map(|v| patch.positions[v as usize]);
         let flat = face.map(|v| patch.flat.get(v as usize));
-        area += 0.5 * (p[1] - p[0]).cross(&(p[2] - p[0])).norm();
         for k in 0..3 {
             let next = (k + 1) % 3;
             let to_next = p[next] - p[k];
@@ -42,12 +49,31 @@ pub fn measure(patch: &Patch, region: &Region) -> Quality {
             }
         }
     }
+    match edges {
+        0 => Stretch {
+            mean: 1.0,
+            most: 1.0,
+        },
+        edges => Stretch {
+            mean: sum / edges as f64,
+            most,
+        },
+    }
+}
+
+/// Measures a patch against its chart, if it has one, and the region it closes.
+pub fn measure(patch: &Patch, region: &Region) -> Quality {
+    let area = |face: &[u32; 3]| {
+        let [a, b, c] = face.map(|v| patch.positions[v as usize]);
+        0.5 * (b - a).cross(&(c - a)).norm()
+    };
+    let stretch = stretch(patch);
     let gap =
         |(k, v): (usize, &u32)| (patch.positions[k] - region.mesh.positions[*v as usize]).norm();
     Quality {
-        area,
-        stretch_mean: if edges == 0 { 1.0 } else { sum / edges as f64 },
-        stretch_max: if edges == 0 { 1.0 } else { most },
+        area: patch.faces.iter().map(area).sum(),
+        stretch_mean: stretch.mean,
+        stretch_max: stretch.most,
         gaussian_curvature: gaussian_curvature(patch),
         seam_gap: patch.rim.iter().enumerate().map(gap).fold(0.0, f64::max),
         self_intersections: patch.crossings,
