@@ -4,6 +4,7 @@
 //! Work, memory and output are counted from the input alone, so that the same request is always refused or always answered.
 
 mod memory;
+pub mod priority;
 mod progress;
 mod spares;
 mod work;

@@ -26,6 +26,13 @@ impl<T> Spares<T> {
         self.lock().pop().map(|spare| spare.value)
     }
 
+    /// The value that was used last of those that fit.
+    pub fn take_where(&self, fits: impl Fn(&T) -> bool) -> Option<T> {
+        let mut spares = self.lock();
+        let at = spares.iter().rposition(|spare| fits(&spare.value))?;
+        Some(spares.remove(at).value)
+    }
+
     /// Keeps a value for later calls.
     pub fn keep(&self, value: T) {
         let since = Instant::now();
@@ -62,7 +69,10 @@ mod tests {
         let spares = Spares::default();
         spares.keep(1);
         spares.keep(2);
-        assert_eq!(spares.take(), Some(2));
+        assert_eq!(spares.take_where(|value| *value < 2), Some(1));
+        assert_eq!(spares.take_where(|value| *value < 2), None);
+        spares.keep(1);
+        assert_eq!(spares.take_where(|value| *value > 1), Some(2));
         spares.keep(3);
         spares.release(Duration::from_secs(3600));
         assert_eq!(spares.count(), 2);

@@ -1,11 +1,12 @@
 //! Threads for the parallel work of calls, apart for each call that runs.
 //!
 //! With one pool for all calls, the small steps of a small mend would wait behind the large ones of others: a thread of rayon takes no new
-//! work before its own list is empty. With a pool for each, the operating system shares the processors between calls.
+//! work before its own list is empty. With a pool for each, the operating system shares the processors between calls, by the priorities of the
+//! threads that make them.
 
 use std::time::Duration;
 
-use darn_budget::{Budget, Spares};
+use darn_budget::{Budget, Spares, priority};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// Most threads of a call. Mends gain little beyond it, and a machine with many processors runs many calls.
@@ -17,7 +18,15 @@ const LARGE: usize = 32 << 20;
 #[derive(Debug)]
 pub struct CallPools {
     threads: usize,
-    spare: Spares<ThreadPool>,
+    spare: Spares<CallPool>,
+}
+
+/// The threads of one call.
+#[derive(Debug)]
+struct CallPool {
+    threads: ThreadPool,
+    /// Theirs, which they have from the thread that made them.
+    priority: i32,
 }
 
 impl Default for CallPools {
@@ -34,15 +43,18 @@ impl CallPools {
     /// Runs a call whose parallel work has its own threads; on the global pool where the system gives no more threads. The result does not
     /// depend on where it runs.
     pub fn run<T: Send>(&self, budget: &Budget, call: impl FnOnce() -> T + Send) -> T {
-        let pool = self.spare.take().or_else(|| {
+        let priority = priority::of_this_thread();
+        let is_alike = |pool: &CallPool| pool.priority == priority;
+        let pool = self.spare.take_where(is_alike).or_else(|| {
             let threads = ThreadPoolBuilder::new().num_threads(self.threads);
             let named = threads.thread_name(|k| format!("call-{k}"));
-            named.build().ok()
+            let threads = named.build().ok()?;
+            Some(CallPool { threads, priority })
         });
         let Some(pool) = pool else {
             return call();
         };
-        let outcome = pool.install(call);
+        let outcome = pool.threads.install(call);
         // The allocator keeps freed memory for each thread: after a large call the threads end, and their memory is free for all.
         if budget.held() < LARGE {
             self.spare.keep(pool);
@@ -90,5 +102,22 @@ mod tests {
             drop(release);
         });
         assert_eq!(pools.spare.count(), 2);
+    }
+
+    #[test]
+    fn the_work_of_a_call_has_the_priority_of_its_caller() {
+        let pools = CallPools::default();
+        let of_call = || pools.run(Budget::unlimited(), priority::of_this_thread);
+        let own = of_call();
+        assert_eq!(own, priority::of_this_thread());
+        let (lowered, of_lowered) = thread::scope(|scope| {
+            let lowered = scope.spawn(|| {
+                priority::lower_this_thread();
+                (priority::of_this_thread(), of_call())
+            });
+            lowered.join().unwrap()
+        });
+        assert_eq!(of_lowered, lowered);
+        assert_eq!(of_call(), own);
     }
 }

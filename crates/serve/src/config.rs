@@ -95,7 +95,7 @@ pub struct ServeArgs {
     #[command(flatten)]
     pub webhooks: WebhookArgs,
 
-    /// Scans mended at once, at most 1024; left out, two per processor. With 0 the process takes jobs for others to run, and needs a database
+    /// Scans mended at once, at most 1024, and one small one more of a client that has nothing running; left out, two per processor. With 0 the process takes jobs for others to run, and needs a database
     #[arg(long, env = "DARN_WORKERS", value_name = "N", value_parser = workers)]
     pub workers: Option<usize>,
 

@@ -24,6 +24,10 @@ pub(crate) struct FairQueue<T> {
     large_limit_of_client: usize,
     /// Large jobs that run.
     large_running: usize,
+    /// Jobs that run.
+    running: usize,
+    /// Whether the worker for first jobs runs one.
+    first_runs: bool,
 }
 
 /// Jobs of at least this cost are large: they leave workers to small ones.
@@ -46,11 +50,21 @@ pub(crate) enum JobClass {
     Large,
 }
 
+/// Which jobs a worker starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum WorkerKind {
+    /// Small jobs of known clients that have nothing running: they need not wait for those of busy clients to end.
+    First,
+    /// All others, and those while the worker for them is busy.
+    Any,
+}
+
 /// A job that has started; to be given back to [`FairQueue::ended`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Started {
     client: Client,
     class: JobClass,
+    worker: WorkerKind,
 }
 
 /// The jobs of a client.
@@ -78,12 +92,19 @@ impl<T> FairQueue<T> {
                 large_limit
             },
             large_running: 0,
+            running: 0,
+            first_runs: false,
         }
     }
 
     /// How many jobs wait.
     pub(crate) fn len(&self) -> usize {
         self.waiting.len()
+    }
+
+    /// How many jobs run.
+    pub(crate) fn running(&self) -> usize {
+        self.running
     }
 
     /// Adds a job that is estimated to cost this much.
@@ -105,17 +126,22 @@ impl<T> FairQueue<T> {
         self.come += 1;
     }
 
-    /// Takes the next job that may start; it counts as running until [`FairQueue::ended`] is called.
-    pub(crate) fn pop(&mut self) -> Option<(Started, T)> {
-        let large_of = |client: &Client| {
-            self.loads
-                .get(client)
-                .map_or(0, |load: &Load| load.large_running)
-        };
-        let may_start = |job: &Waiting<T>| {
+    /// Takes the next job that a worker may start; it counts as running until [`FairQueue::ended`] is called.
+    pub(crate) fn pop(&mut self, worker: WorkerKind) -> Option<(Started, T)> {
+        let load_of = |client: &Client| self.loads.get(client).copied().unwrap_or_default();
+        let is_first = |job: &Waiting<T>| {
             job.class == JobClass::Small
-                || (self.large_running < self.large_limit
-                    && large_of(&job.client) < self.large_limit_of_client)
+                && job.client.is_some()
+                && load_of(&job.client).running == 0
+        };
+        let may_start = |job: &Waiting<T>| match worker {
+            WorkerKind::First => is_first(job),
+            WorkerKind::Any if !self.first_runs && is_first(job) => false,
+            WorkerKind::Any => {
+                job.class == JobClass::Small
+                    || (self.large_running < self.large_limit
+                        && load_of(&job.client).large_running < self.large_limit_of_client)
+            }
         };
         let next = (self.waiting.iter().enumerate())
             .filter(|(_, job)| may_start(job))
@@ -131,19 +157,32 @@ impl<T> FairQueue<T> {
         self.time = self.time.max(tag);
         let large = usize::from(class == JobClass::Large);
         self.large_running += large;
+        self.running += 1;
+        self.first_runs |= worker == WorkerKind::First;
         if let Some(load) = self.loads.get_mut(&client) {
             load.waiting -= 1;
             load.running += 1;
             load.large_running += large;
         }
-        Some((Started { client, class }, job))
+        let started = Started {
+            client,
+            class,
+            worker,
+        };
+        Some((started, job))
     }
 
     /// A job has ended.
     pub(crate) fn ended(&mut self, started: Started) {
-        let Started { client, class } = started;
+        let Started {
+            client,
+            class,
+            worker,
+        } = started;
         let large = usize::from(class == JobClass::Large);
         self.large_running -= large;
+        self.running -= 1;
+        self.first_runs &= worker != WorkerKind::First;
         if let Some(load) = self.loads.get_mut(&client) {
             load.running -= 1;
             load.large_running -= large;
@@ -189,10 +228,16 @@ mod tests {
         Some(ClientId::Address(address))
     }
 
+    /// The next job that any worker may start.
+    fn next<T>(queue: &mut FairQueue<T>) -> Option<(Started, T)> {
+        let first = queue.pop(WorkerKind::First);
+        first.or_else(|| queue.pop(WorkerKind::Any))
+    }
+
     /// The jobs in the order in which one worker starts them.
     fn order(mut queue: FairQueue<u32>) -> Vec<u32> {
         let mut order = Vec::new();
-        while let Some((started, job)) = queue.pop() {
+        while let Some((started, job)) = next(&mut queue) {
             order.push(job);
             queue.ended(started);
         }
@@ -210,18 +255,43 @@ mod tests {
     }
 
     #[test]
+    fn the_worker_for_first_jobs_takes_small_ones_of_clients_that_have_nothing_running() {
+        let mut queue = FairQueue::new(3);
+        (0..3).for_each(|job| queue.push(client(1), 10, job));
+        assert_eq!(queue.pop(WorkerKind::Any), None, "the first is not for it");
+        let (first, job) = queue.pop(WorkerKind::First).unwrap();
+        assert_eq!(job, 0);
+        assert_eq!(queue.pop(WorkerKind::First), None, "one of its client runs");
+        assert_eq!(queue.pop(WorkerKind::Any).map(|(_, job)| job), Some(1));
+        queue.push(client(2), 10, 20);
+        queue.push(client(3), LARGE, 30);
+        queue.push(None, 10, 40);
+        queue.ended(first);
+        assert_eq!(queue.pop(WorkerKind::First).map(|(_, job)| job), Some(20));
+        assert_eq!(queue.pop(WorkerKind::First), None);
+        // While it is busy, others take what it would take.
+        queue.push(client(4), 10, 50);
+        let mut rest: Vec<u32> = std::iter::from_fn(|| queue.pop(WorkerKind::Any))
+            .map(|(_, job)| job)
+            .collect();
+        rest.sort_unstable();
+        assert_eq!(rest, [2, 30, 40, 50]);
+        assert_eq!(queue.running(), 6);
+    }
+
+    #[test]
     fn a_small_job_passes_large_ones_and_a_large_one_is_not_passed_for_ever() {
         let mut queue = FairQueue::new(1);
         (0..8).for_each(|job| queue.push(client(1), 1000, job));
         queue.push(client(1), 10, 100);
-        let (started, job) = queue.pop().unwrap();
+        let (started, job) = next(&mut queue).unwrap();
         assert_eq!(job, 100);
         queue.ended(started);
         // Small jobs keep coming: the first large one starts after about as much work as it costs itself.
         let mut passed = 0;
         loop {
             queue.push(client(2), 10, 200);
-            match queue.pop() {
+            match next(&mut queue) {
                 Some((started, 200)) => queue.ended(started),
                 _ => break,
             }
@@ -235,21 +305,21 @@ mod tests {
         let mut queue = FairQueue::new(3);
         (0..5).for_each(|job| queue.push(client(1), LARGE, job));
         let mut started: Vec<Started> = Vec::new();
-        while let Some((large, _)) = queue.pop() {
+        while let Some((large, _)) = next(&mut queue) {
             started.push(large);
         }
         assert_eq!(started.len(), 2);
         queue.push(client(2), LARGE, 100);
-        let (other, job) = queue.pop().unwrap();
+        let (other, job) = next(&mut queue).unwrap();
         assert_eq!(job, 100);
         // The small job of a client whose large ones run and wait.
         queue.push(client(1), 10, 200);
-        assert_eq!(queue.pop().map(|(_, job)| job), Some(200));
-        assert_eq!(queue.pop(), None);
+        assert_eq!(next(&mut queue).map(|(_, job)| job), Some(200));
+        assert_eq!(next(&mut queue), None);
         queue.ended(other);
-        assert_eq!(queue.pop(), None);
+        assert_eq!(next(&mut queue), None);
         queue.ended(started.remove(0));
-        assert!(queue.pop().is_some());
+        assert!(next(&mut queue).is_some());
     }
 
     proptest! {
@@ -279,7 +349,7 @@ mod tests {
             }
             let unwanted = queue.take_unwanted(|keep| *keep);
             prop_assert_eq!(unwanted.len() + queue.len(), wanted.len());
-            while let Some((started, keep)) = queue.pop() {
+            while let Some((started, keep)) = next(&mut queue) {
                 prop_assert!(keep);
                 queue.ended(started);
             }

@@ -187,7 +187,7 @@ pub fn run(settings: &ServeArgs, mender: Arc<dyn Mender>) -> Result<(), ServeErr
         return Err(ServeError::AloneWithoutWorkers);
     }
     // One more for what blocks: the runtime starts others only if it can.
-    let count = async_threads + settings.workers() + 1;
+    let count = async_threads + settings.workers() + 2;
     threads::check(count).map_err(|source| ServeError::Threads { count, source })?;
     let runtime = runtime::Builder::new_multi_thread()
         .worker_threads(async_threads)

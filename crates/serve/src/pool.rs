@@ -1,6 +1,7 @@
 //! A bounded queue in front of a few blocking worker threads. Runs closures; knows no HTTP and no scans.
 //!
-//! A [`FairQueue`] says which job starts next. A job whose caller left or whose deadline passed is skipped; one that already
+//! A [`FairQueue`] says which job starts next. One worker more than is said takes jobs of clients that have nothing running; all others, and what
+//! they start, leave the processors to it. A job whose caller left or whose deadline passed is skipped; one that already
 //! runs sees its budget.
 
 use std::{
@@ -23,11 +24,11 @@ use tracing::Span;
 
 use super::{
     client::Client,
-    fair_queue::{FairQueue, Started},
+    fair_queue::{FairQueue, Started, WorkerKind},
     pool_task::{PoolError, PoolTask, QueuedTask, TaskOrder},
     telemetry::PoolMetrics,
 };
-use darn_budget::Budget;
+use darn_budget::{Budget, priority};
 
 /// Longest wait suggested to a caller, in seconds.
 const MAX_RETRY_AFTER: u64 = 120;
@@ -128,7 +129,7 @@ impl std::fmt::Debug for Queue {
 }
 
 impl Pool {
-    /// Starts `workers` threads behind `queue` waiting places.
+    /// Starts `workers` threads, and one for first jobs, behind `queue` waiting places.
     ///
     /// # Errors
     /// When a thread cannot be started.
@@ -153,11 +154,18 @@ impl Pool {
             places_changed: Notify::new(),
         });
         let pool = Self(Arc::clone(&shared));
+        let first = Arc::clone(&shared);
+        thread::Builder::new()
+            .name("mend-first".to_owned())
+            .spawn(move || first.run_jobs(WorkerKind::First))?;
         for index in 0..workers {
             let shared = Arc::clone(&shared);
             thread::Builder::new()
                 .name(format!("mend-{index}"))
-                .spawn(move || shared.run_jobs())?;
+                .spawn(move || {
+                    priority::lower_this_thread();
+                    shared.run_jobs(WorkerKind::Any);
+                })?;
         }
         Ok(pool)
     }
@@ -292,7 +300,8 @@ impl Shared {
         queue.jobs.push(client, cost, job);
         self.metrics.waiting.set(queue.jobs.len() as f64);
         drop(queue);
-        self.filled.notify_one();
+        // Not every worker may start it.
+        self.filled.notify_all();
         Ok(())
     }
 
@@ -341,11 +350,13 @@ impl Shared {
         }
     }
 
-    /// Waits for the next job; `None` once the queue is closed and empty.
-    fn next(&self) -> Option<(Started, Box<dyn QueuedTask>)> {
+    /// Waits for the next job that a worker may start; `None` once the queue is closed and empty.
+    fn next(&self, worker: WorkerKind) -> Option<(Started, Box<dyn QueuedTask>)> {
         let mut queue = self.lock();
         loop {
-            if let Some(next) = queue.jobs.pop() {
+            // What the worker for first jobs runs counts, so that no client has more jobs running than there are other workers.
+            let is_free = worker == WorkerKind::First || queue.jobs.running() < self.workers;
+            if is_free && let Some(next) = queue.jobs.pop(worker) {
                 self.metrics.waiting.set(queue.jobs.len() as f64);
                 return Some(next);
             }
@@ -360,8 +371,8 @@ impl Shared {
     }
 
     /// A worker thread: runs jobs until the queue is closed and empty.
-    fn run_jobs(&self) {
-        while let Some((started, job)) = self.next() {
+    fn run_jobs(&self, worker: WorkerKind) {
+        while let Some((started, job)) = self.next(worker) {
             self.run_job(job);
             self.lock().jobs.ended(started);
             // Large jobs may have waited for it to end, and workers for such jobs.
