@@ -42,7 +42,7 @@ use super::{
     result_cache::{CACHE_STATUS, CacheStatus, RequestKey},
     scan_files::AnswerForm,
     service_info, session_routes,
-    telemetry::{REQUEST_ID, RequestId},
+    telemetry::{REQUEST_ID, RequestId, SERVER_TIMING},
     traces,
 };
 use darn_contract::{Constraints, Search, excerpt};
@@ -127,6 +127,7 @@ fn cors(origins: &[String]) -> CorsLayer {
             header::WWW_AUTHENTICATE,
             RATELIMIT,
             RATELIMIT_POLICY,
+            SERVER_TIMING,
         ])
 }
 
@@ -176,19 +177,18 @@ async fn observe(State(app): State<Arc<App>>, mut request: Request, next: Next) 
         response.headers_mut().insert(REQUEST_ID, value);
     }
 
+    let took = started.elapsed();
+    let timing = format!("total;dur={:.2}", took.as_secs_f64() * 1000.0);
+    if let Ok(value) = HeaderValue::try_from(timing) {
+        response.headers_mut().insert(SERVER_TIMING, value);
+    }
+
     let response = response.map(|body| counted_answer(body, &app.limits.memory));
     let status = response.status().as_u16();
-    app.metrics.answered(&route, status, started.elapsed());
+    app.metrics.answered(&route, status, took);
     let code = error.as_ref().map(|error| error.code().word);
     traces::end_request(&trace, status, code);
-    span.in_scope(|| {
-        info!(
-            status,
-            code,
-            ms = started.elapsed().as_secs_f64() * 1000.0,
-            "answered"
-        )
-    });
+    span.in_scope(|| info!(status, code, ms = took.as_secs_f64() * 1000.0, "answered"));
     response
 }
 

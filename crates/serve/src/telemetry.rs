@@ -28,6 +28,8 @@ use darn_contract::v1;
 
 /// The header that carries a request's id, in requests and answers.
 pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
+/// How long the service took until its answer began, in milliseconds (W3C Server Timing).
+pub const SERVER_TIMING: HeaderName = HeaderName::from_static("server-timing");
 
 /// A request's id, as a request extension.
 #[derive(Debug, Clone)]
