@@ -1,5 +1,6 @@
 //! The binary as a user meets it: `darn serve` on a real socket, and the commands beside it.
 
+mod files;
 mod many;
 #[path = "../../crates/jobs/tests/laws/postgres.rs"]
 mod postgres;

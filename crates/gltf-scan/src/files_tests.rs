@@ -206,6 +206,53 @@ fn a_zip_is_read_and_its_other_entries_stay_as_they_are() {
 }
 
 #[test]
+fn entries_of_a_zip_are_found_however_they_are_spelled() {
+    for uri in [
+        "maps/cloth.bin",
+        "./maps//cloth.bin",
+        "maps/./cloth.bin",
+        "maps\\cloth.bin",
+    ] {
+        let (gltf, bin) = separate(uri);
+        for name in [
+            "maps/cloth.bin",
+            "./maps/cloth.bin",
+            "maps\\cloth.bin",
+            "maps//cloth.bin",
+            "maps/./cloth.bin",
+        ] {
+            for folder in ["", "./", "a/", "a\\", "./a//"] {
+                let names = ["cloth.gltf", name].map(|name| format!("{folder}{name}"));
+                let [main, file] = names.each_ref().map(String::as_str);
+                let zip = zipped(&[(file, &bin), (main, &gltf), ("./a/._cloth.gltf", b"fork")]);
+                let scan = Scan::read(zip.clone(), &ScanLimits::default());
+                let scan = scan.unwrap_or_else(|error| panic!("{uri} {file} {main}: {error}"));
+                let out = scan.write(&[patch()]).unwrap();
+                let before = ZipArchive::new(Cursor::new(zip.as_slice())).unwrap();
+                let after = ZipArchive::new(Cursor::new(out.as_slice())).unwrap();
+                let spelled = |zip: &ZipArchive<_>| -> Vec<String> {
+                    zip.file_names().take(3).map(str::to_owned).collect()
+                };
+                assert_eq!(spelled(&before), spelled(&after));
+                let limits = ScanLimits::default();
+                let undone = super::stripped(out, &limits, Budget::unlimited()).unwrap();
+                assert_eq!(undone.unwrap().bytes, zip, "{uri} {file} {main}");
+            }
+        }
+    }
+}
+
+#[test]
+fn of_two_entries_at_one_path_the_plainly_spelled_one_counts() {
+    let (gltf, bin) = separate("cloth.bin");
+    for names in [["./cloth.bin", "cloth.bin"], ["cloth.bin", "./cloth.bin"]] {
+        let files = names.map(|name| (name, if name == "cloth.bin" { &bin[..] } else { b"" }));
+        let zip = zipped(&[files[0], files[1], ("cloth.gltf", &gltf)]);
+        assert!(Scan::read(zip, &ScanLimits::default()).is_ok(), "{names:?}");
+    }
+}
+
+#[test]
 fn zips_that_are_no_scan_are_refused() {
     let (gltf, bin) = separate("cloth.bin");
     let refused = |files: &[(&str, &[u8])]| {

@@ -1,7 +1,9 @@
 //! A zip with a glTF and its files: entries are read when they are needed, and copied as they are into the mended zip.
 
+use std::collections::BTreeMap;
 use std::io::{Cursor, Read, Write};
 use std::ops::Range;
+use std::sync::Arc;
 
 use bytes::Bytes;
 use zip::result::ZipError;
@@ -35,8 +37,10 @@ const BYTE_WORK: u64 = 5;
 pub(super) struct ZipFiles {
     /// The whole zip.
     pub bytes: Bytes,
-    /// Path of the glTF in it.
+    /// Name of the glTF in it, as spelled there.
     pub main: String,
+    /// Per path in the zip the number of its entry, however the name is spelled: `./a`, `b\\a`, `b//a`.
+    places: Arc<BTreeMap<String, usize>>,
     /// The same bytes with their directory; a clone shares both.
     archive: ZipArchive<Cursor<Bytes>>,
 }
@@ -54,10 +58,11 @@ impl ZipFiles {
         }
         let archive = ZipArchive::new(Cursor::new(bytes.clone())).map_err(zip_error)?;
         let is_scan = |name: &&str| {
-            let hidden = name
+            let path = relative(name).unwrap_or_default();
+            let hidden = path
                 .split('/')
                 .any(|part| part.starts_with('.') || part == "__MACOSX");
-            let lower = name.to_ascii_lowercase();
+            let lower = path.to_ascii_lowercase();
             !hidden && (lower.ends_with(".gltf") || lower.ends_with(".glb"))
         };
         let mut scans: Vec<&str> = archive.file_names().filter(is_scan).collect();
@@ -72,16 +77,18 @@ impl ZipFiles {
                 )));
             }
         };
+        let places = Arc::new(places(&archive));
         Ok(Self {
             bytes,
             main,
+            places,
             archive,
         })
     }
 
     /// The glTF.
     pub fn main(&self, allowance: &DecodeAllowance<'_>) -> Result<Bytes, ScanError> {
-        let main = self.entry(&self.main, allowance)?;
+        let main = self.named(&self.main, allowance)?;
         main.ok_or_else(|| broken(format!("{:?} is not there", self.main)))
     }
 
@@ -91,11 +98,12 @@ impl ZipFiles {
         path: &str,
         allowance: &DecodeAllowance<'_>,
     ) -> Result<Option<Bytes>, ScanError> {
-        let folder = self.main.rsplit_once('/').map_or("", |(folder, _)| folder);
-        match relative(format!("{folder}/{path}").trim_start_matches('/')) {
-            Some(path) => self.entry(&path, allowance),
-            None => Ok(None),
-        }
+        let main = relative(&self.main).unwrap_or_default();
+        let folder = main.rsplit_once('/').map_or("", |(folder, _)| folder);
+        let path = relative(format!("{folder}/{path}").trim_start_matches('/'));
+        let place = path.and_then(|path| self.places.get(&path));
+        let file = place.map(|index| self.entry(*index, allowance));
+        file.transpose()
     }
 
     /// The same zip with the mended glTF, and an entry with which [`ZipFiles::before`] undoes that.
@@ -125,7 +133,7 @@ impl ZipFiles {
         let Some((_, name)) = self.undo_entries().last() else {
             return Ok(None);
         };
-        let record = self.entry(&name, allowance)?;
+        let record = self.named(&name, allowance)?;
         record.map_or(Ok(None), |record| {
             zip_undo::before(&self.bytes, &record, allowance)
         })
@@ -196,16 +204,20 @@ impl ZipFiles {
         Ok(out.finish().map_err(zip_error)?.into_inner())
     }
 
-    fn entry(
+    /// The entry with this name, exactly.
+    fn named(
         &self,
         name: &str,
         allowance: &DecodeAllowance<'_>,
     ) -> Result<Option<Bytes>, ScanError> {
+        let index = self.archive.index_for_name(name);
+        index.map(|index| self.entry(index, allowance)).transpose()
+    }
+
+    fn entry(&self, index: usize, allowance: &DecodeAllowance<'_>) -> Result<Bytes, ScanError> {
         let mut archive = self.archive.clone();
-        let Some(index) = archive.index_for_name(name) else {
-            return Ok(None);
-        };
         let entry = archive.by_index(index).map_err(zip_error)?;
+        let name = entry.name().to_owned();
         let (size, packed) = (entry.size(), entry.compressed_size());
         if size > SMALL_ENTRY && size / MAX_RATIO > packed {
             return Err(broken(format!(
@@ -224,8 +236,25 @@ impl ZipFiles {
         if bytes.len() != length {
             return Err(broken(format!("{name:?} is not as long as the zip says")));
         }
-        Ok(Some(bytes.into()))
+        Ok(bytes.into())
     }
+}
+
+/// The entries by their paths. Of several at one path the one counts that is spelled as the path is, else the first.
+fn places(archive: &ZipArchive<Cursor<Bytes>>) -> BTreeMap<String, usize> {
+    let mut places = BTreeMap::new();
+    for (index, name) in archive.file_names().enumerate() {
+        match relative(name) {
+            Some(path) if path == name => {
+                places.insert(path, index);
+            }
+            Some(path) => {
+                places.entry(path).or_insert(index);
+            }
+            None => {}
+        }
+    }
+    places
 }
 
 fn zip_error(error: ZipError) -> ScanError {

@@ -203,7 +203,7 @@ async fn read_scan<P: Parameters>(
                 let files = ScanFiles::of(&form.scan);
                 (counted(form.scan, memory), files, form.parameters)
             } else {
-                let zip = scan_files::bundle(form.scan, form.files, &limits.memory).await?;
+                let zip = scan_files::bundle::<P>(form.scan, form.files, &limits.memory).await?;
                 (zip, ScanFiles::Parts, form.parameters)
             }
         }
@@ -411,7 +411,7 @@ pub async fn form_of(parts: &Parts, body: Body) -> Result<Multipart, RequestErro
     })
 }
 
-/// The name of a part, which may be there and has a media type that is read.
+/// The name of a part, which has a media type that is read.
 ///
 /// # Errors
 /// `Malformed` or `UnsupportedMediaType`.
@@ -421,15 +421,11 @@ pub fn check_part<P: Parameters>(field: &Field<'_>) -> Result<String, RequestErr
     let (expected, read): (_, &[&str]) = match name.as_str() {
         "scan" => (SCAN_PART_MEDIA_TYPES, &SCAN_PART_READ),
         part if part == P::PART => (JSON, &parameters::MEDIA_TYPES),
-        // A file that the scan refers to; the scan knows its type.
-        part if part.contains('.') => ("", &[]),
-        _ => {
-            return Err(RequestError::Malformed(format!(
-                "there is no part `{}`; the parts are `scan`, `{}`, and files of the scan, each named by its URI there",
-                cut(&name, 100),
-                P::PART
-            )));
+        part if part.is_empty() || parameters::PARTS.contains(&part) => {
+            return Err(scan_files::no_such_part::<P>(part));
         }
+        // A file that the scan refers to, which knows its type; [`scan_files::bundle`] looks at the scan.
+        _ => ("", &[]),
     };
     let unread = |it: &String| !read.is_empty() && !read.contains(&it.as_str());
     match media_type.filter(unread) {
@@ -461,8 +457,11 @@ async fn split_form<P: Parameters>(
     }
     let parameters = named.remove(P::PART);
     let parameters = parameters.map(|text| P::parse(&text)).transpose()?;
+    let Some(scan) = named.remove("scan") else {
+        return Err(scan_files::no_scan::<P>(&named));
+    };
     Ok(FormParts {
-        scan: named.remove("scan").ok_or(RequestError::EmptyBody)?,
+        scan,
         files: named,
         parameters,
     })

@@ -179,11 +179,14 @@ async fn form(
             files.insert(name, bytes);
         }
     }
-    let (input, kind) = scan.ok_or(RequestError::EmptyBody)?;
+    let Some((input, kind)) = scan else {
+        return Err(scan_files::no_scan::<KeptConstraints>(&files));
+    };
     if files.is_empty() || input.bytes() == 0 {
         return Ok((input, kind, constraints));
     }
-    let zip = scan_files::bundle(read_back(&input, limits).await?, files, &limits.memory).await?;
+    let scan = read_back(&input, limits).await?;
+    let zip = scan_files::bundle::<KeptConstraints>(scan, files, &limits.memory).await?;
     drop(input);
     Ok((jobs.receive(&zip[..]).await?, ScanFiles::Parts, constraints))
 }

@@ -14,6 +14,9 @@ pub const MAX_BYTES: usize = 1 << 20;
 /// The media types it is read from. `application/octet-stream` is what curl declares for any file.
 pub const MEDIA_TYPES: [&str; 2] = [JSON, OCTET_STREAM];
 
+/// The names of the parts that carry parameters, of every request. No file of a scan has one of them.
+pub const PARTS: [&str; 3] = [Constraints::PART, Search::PART, HolesQuery::PART];
+
 /// Constraints or a query, checked.
 pub trait Parameters: Sized {
     /// Which of the two.

@@ -1,7 +1,7 @@
 //! Scans that come in several files: how they travel to the mender as one zip, and in which form the mended scan goes back.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     io::{Cursor, Write as _},
     sync::Arc,
 };
@@ -16,6 +16,7 @@ use super::{
     counted::{counted, take},
     error::RequestError,
     media_types::{GLB, GLTF, MULTIPART_MIXED, OBJ, PLY, ZIP},
+    parameters::Parameters,
 };
 use darn_budget::MemoryPool;
 use darn_contract::{cut, port::ScanForm};
@@ -102,11 +103,44 @@ fn begins_as_obj(text: &[u8]) -> bool {
     })
 }
 
-/// A zip of a scan and the files that it refers to, by their URIs, stored as they are. It goes no further than to the mender.
+/// The error of a part that is neither the scan, nor parameters, nor a file of the scan.
+pub fn no_such_part<P: Parameters>(name: &str) -> RequestError {
+    RequestError::Malformed(format!(
+        "there is no part `{}`; the parts are `scan`, `{}`, and files of the scan, each named by its URI there",
+        cut(name, 100),
+        P::PART
+    ))
+}
+
+/// The error of a form without the part `scan`.
+pub fn no_scan<P: Parameters>(files: &BTreeMap<String, Bytes>) -> RequestError {
+    match unnamed(&[], files) {
+        Some(name) => no_such_part::<P>(name),
+        None => RequestError::EmptyBody,
+    }
+}
+
+/// The first of the files without a dot in their name that the scan's text does not name: it may be a misspelled part, and would be ignored.
+fn unnamed<'f>(scan: &[u8], files: &'f BTreeMap<String, Bytes>) -> Option<&'f str> {
+    let names = files.keys().map(String::as_str);
+    let doubted: Vec<&str> = names.filter(|name| !name.contains('.')).collect();
+    if doubted.is_empty() {
+        return None;
+    }
+    let uris = |name: &str| [name.to_owned(), name.replace(' ', "%20")].map(String::into_bytes);
+    let wanted: BTreeSet<Vec<u8>> = doubted.iter().flat_map(|name| uris(name)).collect();
+    let texts = scan.split(|byte| *byte == b'"');
+    let named: BTreeSet<&[u8]> = texts.filter(|text| wanted.contains(*text)).collect();
+    let is_named = |name: &str| uris(name).iter().any(|uri| named.contains(uri.as_slice()));
+    doubted.into_iter().find(|name| !is_named(name))
+}
+
+/// A zip of a scan and the files that it refers to, by their names in the form, stored as they are. It goes no further than to the mender,
+/// which knows what their names mean.
 ///
 /// # Errors
-/// `MemoryFull`; `Malformed` for a scan that is a zip itself, or a file with a name that a zip cannot have.
-pub async fn bundle(
+/// `MemoryFull`; `Malformed` for a scan that is a zip itself, a part that is no file of the scan, or one with a name that a zip cannot have.
+pub async fn bundle<P: Parameters>(
     scan: Bytes,
     files: BTreeMap<String, Bytes>,
     pool: &Arc<MemoryPool>,
@@ -121,7 +155,11 @@ pub async fn bundle(
         .map(|(name, bytes)| 2 * name.len() + 256 + bytes.len());
     let length = entries.sum::<usize>() + scan.len() + (4 << 10);
     let memory = take(pool, length)?;
-    let zip = task::spawn_blocking(move || stored(&scan, &files, length)).await;
+    let zipped = move || match unnamed(&scan, &files) {
+        Some(name) => Err(no_such_part::<P>(name)),
+        None => stored(&scan, &files, length),
+    };
+    let zip = task::spawn_blocking(zipped).await;
     let zip = zip.unwrap_or(Err(RequestError::Internal))?;
     Ok(counted(zip.into(), memory))
 }
@@ -184,6 +222,23 @@ mod tests {
             b"v\n",
         ] {
             assert!(!looks_like_a_scan(other), "{other:?}");
+        }
+    }
+
+    #[test]
+    fn a_part_without_a_dot_is_a_file_if_the_scan_names_it() {
+        let scan = br#"{"buffers":[{"uri":"buffer0"},{"uri":"my%20buffer"}]}"#;
+        for (name, expected) in [
+            ("buffer0", None),
+            ("my buffer", None),
+            ("my%20buffer", None),
+            ("picture.png", None),
+            ("buffer1", Some("buffer1")),
+            ("constraint", Some("constraint")),
+            ("uri\":\"buffer0", Some("uri\":\"buffer0")),
+        ] {
+            let files = BTreeMap::from([(name.to_owned(), Bytes::new())]);
+            assert_eq!(unnamed(scan, &files), expected);
         }
     }
 
