@@ -278,6 +278,32 @@ fn decoding_counts_in_the_budget_and_gives_its_memory_back() {
 }
 
 #[test]
+fn counts_that_a_draco_stream_does_not_keep_to_are_noted() {
+    for coding in [Coding::DracoEdgebreaker, Coding::DracoSequential] {
+        let sound = Scan::read(cloth().encode(coding), &ScanLimits::default()).unwrap();
+        assert_eq!(sound.misstated_streams, 0, "{coding:?}");
+        for accessor in 0..4 {
+            for count in [1, 3, 300_000] {
+                let scan = edited(coding, |json, _| {
+                    json["accessors"][accessor]["count"] = json!(count);
+                });
+                let scan = scan.unwrap();
+                assert_eq!(scan.misstated_streams, 1, "{coding:?} {accessor} {count}");
+                assert_eq!(scan.surface, sound.surface);
+            }
+            for count in [json!(-1), json!("many"), json!(0.5)] {
+                let scan = edited(coding, |json, _| {
+                    json["accessors"][accessor]["count"] = count.clone()
+                });
+                let error = scan.unwrap_err();
+                let place = format!("/accessors/{accessor}/count");
+                assert_eq!(error.pointer(), Some(place.as_str()), "{error}");
+            }
+        }
+    }
+}
+
+#[test]
 fn a_draco_point_cloud_is_named() {
     let cloud = edited(Coding::DracoSequential, |_, bin| bin[7] = 0);
     let error = cloud.unwrap_err();

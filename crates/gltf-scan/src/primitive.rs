@@ -1,5 +1,7 @@
 //! The data of one primitive, wherever it is: in plain accessors, or in the primitive's Draco stream.
 
+use gltf::json::mesh::TRIANGLES;
+
 use super::accessor::Accessor;
 use super::buffers::Document;
 use super::compressed::draco::DracoMesh;
@@ -97,6 +99,32 @@ impl<'d, 'a> PrimitiveSource<'d, 'a> {
     /// Number of triangles in the primitive's Draco stream; `None` without one.
     pub fn stream_faces(&self) -> Option<usize> {
         self.draco.as_ref().map(|draco| draco.mesh.faces())
+    }
+
+    /// Whether an accessor of the primitive states another `count` than its Draco stream has. The stream counts: the counts of real files are
+    /// often those from before the compression (Khronos's own samples, glTF-Sample-Models issue 234), and viewers take the stream.
+    pub fn misstates_stream(&self) -> Result<bool, ScanError> {
+        let Some(draco) = &self.draco else {
+            return Ok(false);
+        };
+        let states = |reference: &JsonPlace<'a>| {
+            let (_, accessor) = self.document.root.referred("accessors", reference)?;
+            accessor.need("count")?.integer()
+        };
+        let mut differs = false;
+        let compressed = draco.place.need("attributes")?;
+        for name in compressed.value.as_object().into_iter().flatten() {
+            if let Some(reference) = self.attributes.get(name.0)? {
+                differs |= states(&reference)? != draco.mesh.points();
+            }
+        }
+        let lists_triangles =
+            self.place.integer_or("mode", TRIANGLES as usize)? == TRIANGLES as usize;
+        if let Some(reference) = self.place.get("indices")? {
+            let stated = states(&reference)?;
+            differs |= lists_triangles && stated != 3 * draco.mesh.faces();
+        }
+        Ok(differs)
     }
 
     /// The triangles of the primitive's Draco stream, over `vertices` vertices.

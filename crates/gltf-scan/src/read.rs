@@ -121,6 +121,7 @@ pub(super) fn read_files(
         parts,
         blocks,
         not_finite,
+        misstated,
         others: content,
         ..
     } = reader;
@@ -133,6 +134,7 @@ pub(super) fn read_files(
         surface,
         parts,
         not_finite: not_finite.len(),
+        misstated_streams: misstated,
         blocks,
         bytes,
         layout,

@@ -27,6 +27,8 @@ pub struct Scan {
     /// How many vertices of `surface` have a position that is not finite in the file. No triangle uses them; here they
     /// lie at the origin.
     pub not_finite: usize,
+    /// How many primitives have accessors that state another count than their Draco stream has. The stream counts.
+    pub misstated_streams: usize,
     /// The vertices of `surface` by the accessor they come from, in order.
     pub(crate) blocks: Vec<VertexBlock>,
     pub(crate) bytes: Bytes,

@@ -44,6 +44,8 @@ pub(super) struct ScanReader<'d, 'a> {
     pub(super) blocks: Vec<VertexBlock>,
     /// Vertices whose position is not finite, ascending; triangles that use one are refused.
     pub(super) not_finite: Vec<u32>,
+    /// Primitives whose accessors state another count than their Draco stream has.
+    pub(super) misstated: usize,
     attributes: AttributeReader<'d>,
     skinned: BTreeSet<usize>,
     /// Primitives that draw no triangles.
@@ -66,6 +68,7 @@ impl<'d, 'a> ScanReader<'d, 'a> {
             parts: Vec::new(),
             blocks: Vec::new(),
             not_finite: Vec::new(),
+            misstated: 0,
             attributes: AttributeReader::new(limits),
             skinned: skinned_meshes(document.root.value),
             primitives: 0,
@@ -114,6 +117,7 @@ impl<'d, 'a> ScanReader<'d, 'a> {
             self.others.count(place, mode)?;
             return Ok(None);
         };
+        self.misstated += usize::from(source.misstates_stream()?);
         let node = instance.node;
         let vertices = match vertices_of.get(&position.key) {
             Some(vertices) => vertices.clone(),

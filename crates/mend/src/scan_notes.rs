@@ -57,6 +57,12 @@ pub fn notes(welded: &WeldedScan, scan: &Scan) -> Vec<String> {
             listed("node", &levels)
         ));
     }
+    let misstated = scan.misstated_streams;
+    if misstated > 0 {
+        notes.push(format!(
+            "{misstated} Draco stream(s) hold another number of vertices or triangles than the accessors over them state; the streams were read"
+        ));
+    }
     let trailing = scan.trailing_bytes();
     if trailing > 0 {
         notes.push(format!(
