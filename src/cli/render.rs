@@ -4,8 +4,7 @@ use super::confidence_paint::ConfidencePaint;
 use super::failure::{Failure, OrFail};
 use super::files;
 use super::scan_paint::ScanPaint;
-use crate::settings::SizeArgs;
-use darn_budget::Budget;
+use crate::settings::{DeadlineArgs, SizeArgs};
 use darn_geometry::mesh::index::FaceId;
 use darn_geometry::mesh::weld::WeldedMesh;
 use darn_geometry::mesh::{Vec3, weld};
@@ -48,12 +47,16 @@ pub struct RenderArgs {
     confidence: bool,
     #[command(flatten)]
     limits: SizeArgs,
+    #[command(flatten)]
+    deadline: DeadlineArgs,
 }
 
 /// Runs `darn render`.
 pub fn run(args: &RenderArgs) -> Result<(), Failure> {
-    let scan = files::read_scan(&args.scan, &args.limits, Budget::unlimited())?;
-    let welded = weld::weld(&scan.surface);
+    let budget = args.deadline.budget();
+    let scan = files::read_scan(&args.scan, &args.limits, &budget)?;
+    let welded = weld::weld_within(&scan.surface, &|_| 0.0, &budget);
+    let welded = welded.or_fail(format!("weld {}", args.scan.display()))?;
     let image = match (args.colours || args.variant.is_some(), args.confidence) {
         (true, _) => coloured(&scan, &welded, args)?,
         (false, true) => confident(&scan, &welded, args)?,
@@ -63,6 +66,7 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
             picture(&welded.mesh, &tints, &args.options())
         }
     };
+    budget.check().or_fail("draw the picture")?;
     let mut png = Cursor::new(Vec::new());
     image
         .write_to(&mut png, ImageFormat::Png)

@@ -240,19 +240,21 @@ fn commands_have_the_limits_of_the_service() {
     let folder = tempfile::tempdir().expect("a folder");
     let scan = folder.path().join("scarf.glb");
     std::fs::write(&scan, EXAMPLE).expect("written");
-    for (limit, words) in [
-        (["--max-faces", "10"], "max_faces = 10"),
-        (["--max-vertices", "10"], "max_vertices = 10"),
-        (["--deadline", "1ms"], "deadline has passed"),
-    ] {
-        let out = folder.path().join("mended.glb");
-        let mut command = darn();
-        command.arg("inpaint").arg(&scan).arg("-o").arg(&out);
-        let refused = command.args(limit).output();
-        let refused = refused.expect("darn runs");
-        assert_eq!(refused.status.code(), Some(1), "{limit:?}");
-        let said = String::from_utf8_lossy(&refused.stderr).into_owned();
-        assert!(said.contains(words), "{limit:?}: {said}");
+    let out = folder.path().join("out");
+    for verb in ["inpaint", "render"] {
+        for (limit, words) in [
+            (["--max-faces", "10"], "max_faces = 10"),
+            (["--max-vertices", "10"], "max_vertices = 10"),
+            (["--deadline", "1ms"], "deadline has passed"),
+        ] {
+            let mut command = darn();
+            command.arg(verb).arg(&scan).args(limit).arg("-o").arg(&out);
+            let refused = command.output().expect("darn runs");
+            assert_eq!(refused.status.code(), Some(1), "{verb} {limit:?}");
+            let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+            assert!(said.contains(words), "{verb} {limit:?}: {said}");
+            assert!(!out.exists(), "{verb} {limit:?}");
+        }
     }
 }
 
