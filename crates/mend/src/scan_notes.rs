@@ -75,6 +75,7 @@ pub fn notes(welded: &WeldedScan, scan: &Scan) -> Vec<String> {
 /// What was not taken as the file has it, by kind.
 pub fn set_aside(welded: &WeldedScan, scan: &Scan) -> Vec<v1::SetAside> {
     let own = welded.surface.set_aside;
+    let second_skins = welded.second_skins.iter().flatten().count();
     let counts = [
         ("degenerate_face", own.degenerate_faces),
         ("duplicate_face", own.duplicate_faces),
@@ -83,6 +84,7 @@ pub fn set_aside(welded: &WeldedScan, scan: &Scan) -> Vec<v1::SetAside> {
         ("t_junction", own.t_junctions),
         ("near_seam_vertex", own.near_seam_vertices),
         ("vertex_not_finite", scan.not_finite),
+        ("second_skin_hole", second_skins),
     ];
     counts
         .into_iter()

@@ -20,21 +20,41 @@ pub enum Defect {
     DegenerateFace,
     /// An edge that one of its two triangles has in two parts.
     TJunction,
+    /// A triangle that is ten thousand times as long as high, between two others.
+    Sliver,
+    /// Two triangles on a border edge, one turned up from the border and one turned down.
+    RimFin,
+    /// An edge from the border inward that one of its two triangles has in two parts: its slit opens into the border.
+    RimTJunction,
+    /// A triangle on a border edge that is ten thousand times as long as high.
+    RimSliver,
     /// A seam through the middle of the mesh, across x, whose two sides differ by a hundred-thousandth of the mesh's size.
     NearSeam,
 }
 
 impl Defect {
     /// Every kind.
-    pub const ALL: [Defect; 6] = [
+    pub const ALL: [Defect; 10] = [
         Defect::FlippedFace,
         Defect::Fin,
         Defect::DuplicateFace,
         Defect::DegenerateFace,
         Defect::TJunction,
+        Defect::Sliver,
+        Defect::RimFin,
+        Defect::RimTJunction,
+        Defect::RimSliver,
         Defect::NearSeam,
     ];
+
+    /// Whether it lies at a border.
+    fn is_at_rim(self) -> bool {
+        matches!(self, Self::RimFin | Self::RimTJunction | Self::RimSliver)
+    }
 }
+
+/// Height of a sliver, in lengths of its longest edge.
+const SLIVER_HEIGHT: f64 = 1e-4;
 
 /// The mesh with defects of these kinds: one to four of each at random places that do not touch each other, and one
 /// seam. Faces that are not changed stay in place; new ones follow.
@@ -71,10 +91,10 @@ impl Change {
         if kind == Defect::NearSeam {
             return self.cut_seam();
         }
-        let Some(face) = self.untouched_face() else {
+        let Some(Side { face, corners }) = self.untouched(kind.is_at_rim()) else {
             return;
         };
-        let [a, b, c] = self.mesh.faces[face];
+        let [a, b, c] = corners;
         match kind {
             Defect::FlippedFace => self.mesh.faces[face] = [a, c, b],
             Defect::DuplicateFace => {
@@ -94,24 +114,52 @@ impl Change {
                 if self.across(a, b).is_none() {
                     return;
                 }
-                let [p, q, r] = self.mesh.triangle(face);
-                let up = (q - p).cross(&(r - p)).normalize() * (q - p).norm();
-                let tip = self.vertex((p + q) * 0.5 + up);
+                let [middle, up, _] = self.axes(&corners);
+                let tip = self.vertex(middle + up);
                 self.mesh.faces.push([a, b, tip]);
             }
-            Defect::TJunction => {
-                let Some(other) = self.across(a, b) else {
-                    return;
-                };
-                let [from, to, tip] = other.corners;
-                self.touched.insert(tip);
-                let [p, q] = [a, b].map(|v| self.mesh.positions[v as usize]);
-                let middle = self.vertex((p + q) * 0.5);
-                self.mesh.faces[other.face] = [from, middle, tip];
-                self.mesh.faces.push([middle, to, tip]);
+            Defect::RimFin => {
+                let [middle, up, inward] = self.axes(&corners);
+                for height in [0.5, -0.5] {
+                    let tip = self.vertex(middle + up * height - inward * 0.3);
+                    self.mesh.faces.push([b, a, tip]);
+                }
+            }
+            Defect::TJunction => self.split_across(a, b),
+            Defect::RimTJunction => self.split_across(b, c),
+            Defect::Sliver => {
+                let [middle, _, inward] = self.axes(&corners);
+                let tip = self.vertex(middle + inward * SLIVER_HEIGHT);
+                self.mesh.faces[face] = [a, tip, c];
+                self.mesh.faces.extend([[tip, b, c], [a, b, tip]]);
+            }
+            Defect::RimSliver => {
+                let [middle, _, inward] = self.axes(&corners);
+                let tip = self.vertex(middle - inward * SLIVER_HEIGHT);
+                self.mesh.faces.push([b, a, tip]);
             }
             Defect::NearSeam => {}
         }
+    }
+
+    /// Splits the face on the other side of an edge at the edge's middle; nothing at the border.
+    fn split_across(&mut self, a: u32, b: u32) {
+        let Some(other) = self.across(a, b) else {
+            return;
+        };
+        let [from, to, tip] = other.corners;
+        self.touched.insert(tip);
+        let [p, q] = [a, b].map(|v| self.mesh.positions[v as usize]);
+        let middle = self.vertex((p + q) * 0.5);
+        self.mesh.faces[other.face] = [from, middle, tip];
+        self.mesh.faces.push([middle, to, tip]);
+    }
+
+    /// The middle of a face's first edge, and vectors of that edge's length up from the face and into it.
+    fn axes(&self, corners: &[u32; 3]) -> [Vec3; 3] {
+        let [p, q, r] = corners.map(|v| self.mesh.positions[v as usize]);
+        let up = (q - p).cross(&(r - p)).normalize();
+        [(p + q) * 0.5, up * (q - p).norm(), up.cross(&(q - p))]
     }
 
     fn vertex(&mut self, at: Vec3) -> u32 {
@@ -119,23 +167,45 @@ impl Change {
         self.mesh.positions.len() as u32 - 1
     }
 
-    /// A face at random that no defect is near; its corners count as near one from then on.
-    fn untouched_face(&mut self) -> Option<usize> {
+    /// A face at random that no defect is near, its first edge on the border if that is asked for; its corners count as near one from then on.
+    fn untouched(&mut self, at_rim: bool) -> Option<Side> {
+        let sides: Vec<Side> = if at_rim {
+            self.rim_sides()
+        } else {
+            let faces = self.mesh.faces.iter().enumerate();
+            faces
+                .map(|(face, &corners)| Side { face, corners })
+                .collect()
+        };
         for _ in 0..100 {
-            let face = self.rng.random_range(0..self.mesh.faces.len());
-            let corners = self.mesh.faces[face];
+            let side = *sides.get(self.rng.random_range(0..sides.len().max(1)))?;
+            let corners = side.corners;
             if corners.iter().all(|v| !self.touched.contains(v)) {
                 let near = |f: &&[u32; 3]| f.iter().any(|v| corners.contains(v));
                 let around = self.mesh.faces.iter().filter(near);
                 self.touched.extend(around.flatten().copied());
-                return Some(face);
+                return Some(side);
             }
         }
         None
     }
 
+    /// The faces at the border, once for each of their border edges, which come first.
+    fn rim_sides(&self) -> Vec<Side> {
+        let edges = |corners: [u32; 3]| {
+            [0, 1, 2].map(|k: usize| [0, 1, 2].map(|i: usize| corners[(k + i) % 3]))
+        };
+        let directed = self.mesh.faces.iter().flat_map(|face| edges(*face));
+        let directed: BTreeSet<[u32; 2]> = directed.map(|[a, b, _]| [a, b]).collect();
+        let faces = self.mesh.faces.iter().enumerate();
+        let sides =
+            faces.flat_map(|(face, corners)| edges(*corners).map(|corners| Side { face, corners }));
+        let at_rim = |side: &Side| !directed.contains(&[side.corners[1], side.corners[0]]);
+        sides.filter(at_rim).collect()
+    }
+
     /// The face on the other side of an edge, if there is one.
-    fn across(&self, a: u32, b: u32) -> Option<Across> {
+    fn across(&self, a: u32, b: u32) -> Option<Side> {
         self.mesh
             .faces
             .iter()
@@ -143,7 +213,7 @@ impl Change {
             .find_map(|(face, corners)| {
                 let k = (0..3).find(|&k| corners[k] == b && corners[(k + 1) % 3] == a)?;
                 let corners = [0, 1, 2].map(|i: usize| corners[(k + i) % 3]);
-                Some(Across { face, corners })
+                Some(Side { face, corners })
             })
     }
 
@@ -190,9 +260,9 @@ impl Change {
     }
 }
 
-/// A face on the other side of an edge.
-struct Across {
+/// A face, and its corners from an edge's end on.
+#[derive(Debug, Clone, Copy)]
+struct Side {
     face: usize,
-    /// Its corners, from the edge's end on.
     corners: [u32; 3],
 }
