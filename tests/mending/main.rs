@@ -11,6 +11,7 @@ mod cuts;
 mod editing;
 #[path = "../../crates/gltf-scan/src/compressed/encoded.rs"]
 mod encoded;
+mod files;
 mod laws;
 mod mesh_files;
 mod patched;
