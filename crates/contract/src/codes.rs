@@ -145,6 +145,8 @@ codes! {
     WEBHOOKS_OFF = "webhooks_off", 422, FailedPrecondition;
     /// Every attempt at the job ended its process.
     JOB_CRASHED_WORKER = "job_crashed_worker", 500, Internal;
+    /// The database, or the storage of files, of the jobs cannot be reached.
+    JOBS_UNAVAILABLE = "jobs_unavailable", 503, Unavailable;
     /// The disk on which jobs are kept is full.
     STORAGE_FULL = "storage_full", 507, Unavailable;
 

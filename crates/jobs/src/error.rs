@@ -73,6 +73,15 @@ pub enum JobError {
 }
 
 impl JobError {
+    /// Whether the database or the storage of the files cannot be reached, or takes no work now: the same call may do later.
+    pub fn is_outage(&self) -> bool {
+        match self {
+            Self::Database(error) => is_database_away(error),
+            Self::File { source, .. } => is_storage_away(source.kind()),
+            _ => false,
+        }
+    }
+
     /// The error of a file operation.
     pub(crate) fn file(doing: impl FnOnce() -> String, source: io::Error) -> Self {
         match source.kind() {
@@ -91,6 +100,40 @@ const SQLITE_FULL: &str = "13";
 const SQLITE_LOG_INDEX_FULL: &str = "4874";
 /// PostgreSQL's code for a full disk (<https://www.postgresql.org/docs/15/errcodes-appendix.html>).
 const POSTGRES_DISK_FULL: &str = "53100";
+
+/// The classes and codes of a PostgreSQL that takes no work now: connections that fail, a shutdown or a start, too many connections, and a server
+/// that only reads, as a standby does (<https://www.postgresql.org/docs/15/errcodes-appendix.html>).
+const POSTGRES_AWAY: [&str; 4] = ["08", "57P0", "53300", "25006"];
+
+fn is_database_away(error: &sqlx::Error) -> bool {
+    match error {
+        sqlx::Error::Io(_)
+        | sqlx::Error::Tls(_)
+        | sqlx::Error::Protocol(_)
+        | sqlx::Error::PoolTimedOut
+        | sqlx::Error::PoolClosed => true,
+        sqlx::Error::Database(error) => error.code().is_some_and(|code| {
+            // SQLite's codes are shorter numbers.
+            code.len() == 5 && POSTGRES_AWAY.iter().any(|away| code.starts_with(away))
+        }),
+        _ => false,
+    }
+}
+
+fn is_storage_away(kind: io::ErrorKind) -> bool {
+    matches!(
+        kind,
+        io::ErrorKind::NotConnected
+            | io::ErrorKind::ConnectionRefused
+            | io::ErrorKind::ConnectionReset
+            | io::ErrorKind::ConnectionAborted
+            | io::ErrorKind::TimedOut
+            | io::ErrorKind::HostUnreachable
+            | io::ErrorKind::NetworkUnreachable
+            | io::ErrorKind::NetworkDown
+            | io::ErrorKind::StaleNetworkFileHandle
+    )
+}
 
 impl From<sqlx::Error> for JobError {
     fn from(error: sqlx::Error) -> Self {

@@ -3,7 +3,7 @@
 use darn_contract::port::Refusal;
 use darn_contract::{Code, FieldError, JsonError, codes};
 use darn_jobs::{JobError, State};
-use tracing::error;
+use tracing::{error, warn};
 use uuid::Uuid;
 
 use super::{
@@ -173,6 +173,11 @@ pub enum RequestError {
     /// The disk is full.
     #[error("the storage in which this service keeps jobs is full (DARN_DATA, DARN_BLOBS)")]
     StorageFull,
+    /// The database or the files of the jobs are away.
+    #[error(
+        "the database, or the storage of files, in which this service keeps jobs cannot be reached; try again in {OUTAGE_WAIT} s, with the same `idempotency-key`"
+    )]
+    JobsUnavailable,
     /// Too many jobs wait.
     #[error(
         "{waiting} jobs wait and {running} run, which is all this service takes (DARN_QUEUE); try again in {retry_after} s"
@@ -312,6 +317,7 @@ impl RequestError {
             Self::IdempotencyMismatch { .. } => codes::IDEMPOTENCY_MISMATCH,
             Self::WebhooksOff => codes::WEBHOOKS_OFF,
             Self::StorageFull => codes::STORAGE_FULL,
+            Self::JobsUnavailable => codes::JOBS_UNAVAILABLE,
             Self::QueueFull { .. } => codes::QUEUE_FULL,
             Self::UploadsFull { .. } | Self::UploadShareFull { .. } => codes::UPLOADS_FULL,
             Self::MemoryFull { .. } => codes::MEMORY_FULL,
@@ -354,6 +360,7 @@ impl RequestError {
             | Self::MemoryFull { .. }
             | Self::Session(SessionError::Full { .. }) => Some(5),
             Self::Refused(refusal) if refusal.code == codes::MEMORY_FULL => Some(5),
+            Self::JobsUnavailable => Some(OUTAGE_WAIT),
             Self::Session(SessionError::Busy { .. }) => Some(1),
             _ => None,
         }
@@ -371,6 +378,10 @@ impl From<JobError> for RequestError {
             JobError::Expired(_) => Self::JobExpired,
             JobError::IdempotencyMismatch { job } => Self::IdempotencyMismatch { job },
             JobError::StorageFull => Self::StorageFull,
+            error if error.is_outage() => {
+                warn!(?error, "the jobs cannot be reached");
+                Self::JobsUnavailable
+            }
             error => {
                 error!(?error, "the jobs failed");
                 Self::Internal
@@ -378,6 +389,9 @@ impl From<JobError> for RequestError {
         }
     }
 }
+
+/// Suggested seconds to wait for a database or a storage that is away.
+const OUTAGE_WAIT: u64 = 10;
 
 /// What [`JobError::WrongState`] says was asked when a file of a job was to be read.
 const READ: &str = "read";

@@ -7,7 +7,7 @@ const FULL: [&str; 3] = ["XMinioStorageFull", "QuotaExceeded", "InsufficientStor
 
 /// The error's kind and cause, without anything of credentials.
 ///
-/// The kind is `NotFound` where the object is missing, not where the bucket is.
+/// The kind is `NotConnected` where the storage cannot be reached or takes no work now, `NotFound` where the object is missing, not where the bucket is.
 pub(super) fn cause(error: &object_store::Error) -> io::Error {
     let text = error.to_string();
     let code = between(&text, "<Code>", "</Code>");
@@ -19,6 +19,8 @@ pub(super) fn cause(error: &object_store::Error) -> io::Error {
         (object_store::Error::NotFound { .. }, _) => io::ErrorKind::NotFound,
         (object_store::Error::PermissionDenied { .. }, _)
         | (object_store::Error::Unauthenticated { .. }, _) => io::ErrorKind::PermissionDenied,
+        // Without a status nothing was answered.
+        _ if status.is_none_or(is_busy) => io::ErrorKind::NotConnected,
         _ => io::ErrorKind::Other,
     };
     let said = match (code, between(&text, "<Message>", "</Message>"), status) {
@@ -32,6 +34,11 @@ pub(super) fn cause(error: &object_store::Error) -> io::Error {
         None => said,
     };
     io::Error::new(kind, said)
+}
+
+/// Whether an answer with this status may be another one later.
+fn is_busy(status: &str) -> bool {
+    status.starts_with('5') || status.starts_with("429")
 }
 
 /// The last cause: what the system, TLS or the settings say.
@@ -91,9 +98,15 @@ mod tests {
         assert_eq!(
             (down.kind(), down.to_string().as_str()),
             (
-                io::ErrorKind::Other,
+                io::ErrorKind::NotConnected,
                 "it answers with 503 Service Unavailable"
             )
+        );
+        let wrong = said("status code: 400 Bad Request: <Code>InvalidArgument</Code>");
+        assert_eq!(wrong.kind(), io::ErrorKind::Other);
+        assert_eq!(
+            said("tcp connect error").kind(),
+            io::ErrorKind::NotConnected
         );
     }
 }
