@@ -77,7 +77,8 @@ async fn states(client: &mut Client, job: &Job) -> Vec<JobState> {
     states
 }
 
-async fn parts(mut chunks: Streaming<InpaintChunk>) -> (usize, Vec<u8>) {
+/// Of a mended scan: how many holes its report has, and its bytes.
+pub async fn parts(mut chunks: Streaming<InpaintChunk>) -> (usize, Vec<u8>) {
     let Some(Part::Report(report)) = chunks.message().await.unwrap().unwrap().part else {
         panic!("the first chunk has the report");
     };
@@ -91,8 +92,9 @@ async fn parts(mut chunks: Streaming<InpaintChunk>) -> (usize, Vec<u8>) {
     (report.holes.len(), scan)
 }
 
+/// The status of a refusal, which has this code, and its word.
 #[track_caller]
-fn is_refused<T: std::fmt::Debug>(answer: Result<T, Status>, code: Code, word: &str) -> Status {
+pub fn is_refused<T: std::fmt::Debug>(answer: Result<T, Status>, code: Code, word: &str) -> Status {
     let status = answer.unwrap_err();
     assert_eq!(status.code(), code, "{status:?}");
     assert_eq!(status.metadata().get("darn-code").unwrap(), word);
@@ -330,10 +332,23 @@ async fn keys_and_quotas_are_those_of_http() {
     let running = client.submit(with_key("lab", held("a"))).await;
     let running = running.unwrap().into_inner();
     keyed.service.fake.wait_for_scan("a").await;
-    let waiting = client.submit(with_key("lab", held("b"))).await;
+    let labelled = |name| {
+        let idempotency_key = Some("second".to_owned());
+        let labels = JobLabels {
+            idempotency_key,
+            ..JobLabels::default()
+        };
+        chunks(FakeScan::holding(name), labels)
+    };
+    let waiting = client.submit(with_key("lab", labelled("b"))).await;
     let waiting = waiting.unwrap().into_inner();
     let beyond = client.submit(with_key("lab", held("c"))).await;
     is_refused(beyond, Code::ResourceExhausted, "quota_exceeded");
+    // A repeated call makes no job, so there need be no room for one.
+    let again = client.submit(with_key("lab", labelled("b"))).await;
+    assert_eq!(again.unwrap().into_inner().id, waiting.id);
+    let other = client.submit(with_key("lab", labelled("another"))).await;
+    is_refused(other, Code::InvalidArgument, "idempotency_mismatch");
     // For another key they do not exist.
     for job in [&running, &waiting] {
         let hidden = client.get(with_key("other", id(job))).await;

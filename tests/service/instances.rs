@@ -1,14 +1,19 @@
 //! Several processes that serve together: where sessions are, and a process without workers.
 
-use darn_serve::{ServeError, generated::darn_client::DarnClient};
+use darn_contract::v1::JobQuery;
+use darn_serve::{
+    ServeError,
+    generated::{darn_client::DarnClient, jobs_client::JobsClient},
+};
 use reqwest::StatusCode;
 use serde_json::Value;
 use std::sync::Arc;
 use tempfile::TempDir;
-use tonic::Code;
+use tonic::{Code, codegen::tokio_stream};
 
 use crate::{
     fake::{Behaviour, FakeMender, FakeScan},
+    grpc_jobs::{is_refused, parts},
     harness::{Service, Settings, problem, until},
     postgres::Server,
     protocols::chunks,
@@ -149,7 +154,52 @@ async fn a_process_without_workers_has_others_mend() {
     let refused = grpc.find_holes(chunks("cloth", None)).await.unwrap_err();
     assert_eq!(refused.code(), Code::FailedPrecondition);
     assert_eq!(refused.metadata().get("darn-code").unwrap(), "no_workers");
-    drop(worker);
+    // That of gRPC which is `POST /inpaint` is handed over like it.
+    let answer = grpc.inpaint(chunks("wool", None)).await.unwrap();
+    let (holes, bytes) = parts(answer.into_inner()).await;
+    assert_eq!((holes, bytes), (1, FakeScan::named("wool").mended()));
+    let refused = grpc.inpaint(chunks(Behaviour::RefuseNotADisk, None)).await;
+    is_refused(refused, Code::FailedPrecondition, "not_a_disk");
+    let empty = grpc.inpaint(tokio_stream::iter(Vec::new())).await;
+    is_refused(empty, Code::InvalidArgument, "empty_body");
+    let mut hasty = DarnClient::connect(hasty.url("")).await.unwrap();
+    let late = hasty.inpaint(chunks(Behaviour::Hold, None)).await;
+    let late = is_refused(late, Code::DeadlineExceeded, "deadline_exceeded");
+    let job = late.metadata().get("darn-job").unwrap().to_str().unwrap();
+    let found = door.get(&format!("/jobs/{job}")).send().await.unwrap();
+    assert_eq!(found.status(), 200);
+    worker.fake.release();
+}
+
+#[tokio::test]
+async fn a_database_that_is_away_is_said_to_be_so() {
+    let server = Server::start(&["-c", "fsync=off"]);
+    let (url, folder) = (server.database().await, tempfile::tempdir().unwrap());
+    let data = folder.path().to_str().unwrap();
+    let service = Service::start(&["--data", data, "--database", &url]).await;
+    // It ends with this value.
+    drop(server);
+    until(async || service.get("/jobs").send().await.unwrap().status() != 200).await;
+    let later = service.scan("cloth").header("prefer", "respond-async");
+    let scan = service.post("/jobs").body(FakeScan::named("cloth").bytes());
+    for request in [
+        service.get("/jobs"),
+        service.get("/jobs/6f1e8b0a-0000-4000-8000-000000000000"),
+        scan.header("content-type", "model/gltf-binary"),
+        later,
+    ] {
+        let answer = request.send().await.unwrap();
+        assert_eq!(answer.status(), 503);
+        assert_eq!(answer.headers()["retry-after"], "10");
+        assert_eq!(problem(answer).await["code"], "jobs_unavailable");
+    }
+    let mut grpc = JobsClient::connect(service.url("")).await.unwrap();
+    let refused = grpc.list(JobQuery::default()).await;
+    let refused = is_refused(refused, Code::Unavailable, "jobs_unavailable");
+    assert_eq!(refused.metadata().get("retry-after").unwrap(), "10");
+    // What takes no job goes on.
+    let answer = service.scan("linen").send().await.unwrap();
+    assert_eq!(answer.status(), 200);
 }
 
 #[tokio::test]

@@ -338,6 +338,20 @@ async fn jobs_are_listed_newest_first_page_by_page() {
 }
 
 #[tokio::test]
+async fn no_job_is_ever_created_and_pipelines_may_ask() {
+    let folder = folder();
+    let service = service(&folder, &[]).await;
+    accepted(hand_over(&service, "cloth")).await;
+    let list = |query: &str| service.get(&format!("/jobs?{query}")).send();
+    let page: Value = list("state=created").await.unwrap().json().await.unwrap();
+    assert_eq!(page, json!({ "jobs": [] }));
+    let refused = problem(list("state=made").await.unwrap()).await;
+    assert!(refused["detail"].as_str().unwrap().contains("`created`"));
+    let refused = list("state=created&limit=0").await.unwrap();
+    assert_eq!(refused.status(), 400);
+}
+
+#[tokio::test]
 async fn requests_go_first_and_jobs_keep_one_worker() {
     let folder = folder();
     let service = service(&folder, &["--workers", "2", "--queue", "8"]).await;

@@ -10,7 +10,10 @@ use std::{
 
 use darn_contract::v1::ScanChunk;
 use darn_serve::generated::darn_client::DarnClient;
-use reqwest::{RequestBuilder, Response};
+use reqwest::{
+    RequestBuilder, Response,
+    multipart::{Form, Part},
+};
 use serde_json::{Value, json};
 use tokio::{
     io::{AsyncReadExt as _, AsyncWriteExt as _},
@@ -217,6 +220,61 @@ async fn jobs_that_wait_and_run_are_counted_by_key() {
     until(|| async { states(&keyed, "a", "done").await == 3 }).await;
     let again = job(&keyed, "a", "again".into()).send().await.unwrap();
     assert_eq!(again.status(), 202);
+}
+
+#[tokio::test]
+async fn a_repeated_request_for_a_job_asks_no_quota_of_jobs() {
+    let keyed = Keyed::start(
+        &[limited("a", json!({ "runningJobs": 1, "waitingJobs": 2 }))],
+        &[],
+    )
+    .await;
+    let running = job(&keyed, "a", FakeScan::holding("first")).send().await;
+    assert_eq!(running.unwrap().status(), 202);
+    keyed.service.fake.wait_for_scan("first").await;
+    let named = |path: &str, key: &str, request: fn(RequestBuilder) -> RequestBuilder| {
+        let request = request(keyed.post("a", path)).header("idempotency-key", key.to_owned());
+        request.header("prefer", "respond-async").send()
+    };
+    let bare = |request: RequestBuilder| {
+        let request = request.header("content-type", "model/gltf-binary");
+        request.body(FakeScan::named("cloth").bytes())
+    };
+    let another = |request: RequestBuilder| {
+        let request = request.header("content-type", "model/gltf-binary");
+        request.body(FakeScan::named("linen").bytes())
+    };
+    // The parts of a scan become one file, which is compared.
+    let parts = |request: RequestBuilder| {
+        let part = |name: &str| Part::bytes(FakeScan::named(name).bytes());
+        request.multipart(
+            Form::new()
+                .part("scan", part("cloth"))
+                .part("cloth.bin", part("bin")),
+        )
+    };
+    let mut paths = Vec::new();
+    for (key, request) in [("bare", bare as fn(_) -> _), ("parts", parts)] {
+        let answer = named("/jobs", key, request).await.unwrap();
+        assert_eq!(answer.status(), 202);
+        paths.push(answer.headers()["location"].clone());
+    }
+    refused(named("/jobs", "new", bare).await.unwrap(), "waiting-jobs").await;
+    for path in ["/jobs", "/inpaint"] {
+        for (first, (key, request)) in paths
+            .iter()
+            .zip([("bare", bare as fn(_) -> _), ("parts", parts)])
+        {
+            let again = named(path, key, request).await.unwrap();
+            assert_eq!(again.status(), 202, "{path} {key}");
+            assert_eq!(&again.headers()["location"], first);
+            let other = named(path, key, another).await.unwrap();
+            assert_eq!(other.status(), 422);
+            assert_eq!(problem(other).await["code"], "idempotency_mismatch");
+        }
+    }
+    assert_eq!(states(&keyed, "a", "waiting").await, 2);
+    keyed.service.fake.release();
 }
 
 #[tokio::test]

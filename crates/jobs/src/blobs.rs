@@ -11,7 +11,12 @@ mod name;
 #[cfg(feature = "s3")]
 mod objects;
 
-use std::{fmt, path::PathBuf, pin::Pin, time::Duration};
+use std::{
+    fmt,
+    path::PathBuf,
+    pin::{Pin, pin},
+    time::Duration,
+};
 
 use sha2::{Digest, Sha256};
 use tokio::io::{AsyncRead, AsyncReadExt};
@@ -142,6 +147,17 @@ impl Blobs {
             Storage::Objects(objects) => objects.unnamed(age).await,
         }
     }
+}
+
+/// What a file with this content would be, without writing it.
+pub(crate) async fn measure(content: impl AsyncRead) -> Result<Written, JobError> {
+    let content = pin!(content);
+    let mut source = Source::new(content);
+    let mut buffer = Vec::with_capacity(CHUNK);
+    while source.read(&mut buffer).await? > 0 {
+        buffer.clear();
+    }
+    Ok(source.written())
 }
 
 /// The stream of a file that is written, which counts and digests what it gives.

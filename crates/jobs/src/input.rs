@@ -3,7 +3,7 @@
 use uuid::Uuid;
 
 use super::{
-    blobs::{BlobFile, BlobName, Blobs, Written},
+    blobs::{self, BlobFile, BlobName, Blobs, Written},
     error::JobError,
     jobs::Jobs,
 };
@@ -23,6 +23,11 @@ impl ReceivedInput {
     /// Its bytes.
     pub fn bytes(&self) -> u64 {
         self.written.bytes
+    }
+
+    /// What is known of its file.
+    pub fn written(&self) -> &Written {
+        &self.written
     }
 
     /// Opens it for reading.
@@ -62,5 +67,13 @@ impl Jobs {
             blobs: self.blobs().clone(),
             is_kept: false,
         })
+    }
+
+    /// Reads an input whose job was made before, for [`Self::repeated`]: nothing is stored, so it takes no space.
+    ///
+    /// # Errors
+    /// [`JobError::Stream`] where the stream fails.
+    pub async fn measure(&self, input: impl AsyncRead) -> Result<Written, JobError> {
+        blobs::measure(input).await
     }
 }

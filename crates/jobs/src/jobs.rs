@@ -16,7 +16,7 @@ use tracing::{error, warn};
 use uuid::Uuid;
 
 use super::{
-    blobs::{BlobFile, BlobName, Blobs, Files},
+    blobs::{BlobFile, BlobName, Blobs, Files, Written},
     claimed::ClaimedJob,
     company::RunningJobs,
     error::JobError,
@@ -152,6 +152,29 @@ impl Jobs {
             Err(_) => {}
         }
         created
+    }
+
+    /// Whether a client has made a job with this idempotency key that is not forgotten.
+    pub async fn has_key(&self, client: &str, key: &str) -> Result<bool, JobError> {
+        Ok(self.store.keyed(client, key).await?.is_some())
+    }
+
+    /// The job that an earlier submission with the same idempotency key has made, whatever there is room for; `None` where there is none.
+    ///
+    /// # Errors
+    /// [`JobError::IdempotencyMismatch`] where that one had another payload.
+    pub async fn repeated(
+        &self,
+        submission: &Submission,
+        input: &Written,
+    ) -> Result<Option<Job>, JobError> {
+        let Some(key) = &submission.idempotency_key else {
+            return Ok(None);
+        };
+        match self.store.keyed(&submission.client, key).await? {
+            None => Ok(None),
+            Some(first) => first.of(&digest(submission, &input.sha256)).map(Some),
+        }
     }
 
     /// A job.

@@ -58,6 +58,28 @@ impl fmt::Debug for Clock {
     }
 }
 
+/// A job that was made with an idempotency key.
+#[derive(Debug)]
+pub(crate) struct Keyed {
+    job: Job,
+    /// Digest of the payload that made it.
+    digest: String,
+}
+
+impl Keyed {
+    /// The job, if a payload of this digest made it.
+    ///
+    /// # Errors
+    /// [`JobError::IdempotencyMismatch`].
+    pub(crate) fn of(self, digest: &str) -> Result<Job, JobError> {
+        if self.digest == digest {
+            Ok(self.job)
+        } else {
+            Err(JobError::IdempotencyMismatch { job: self.job.id })
+        }
+    }
+}
+
 /// All jobs.
 #[derive(Debug)]
 pub struct Store {
@@ -161,18 +183,24 @@ impl Store {
             if let Some(row) = first(self.engine.write(Urgency::Ordinary, &insert, args).await?) {
                 return Ok(Submitted::New(job(&row)?));
             }
-            let find = "SELECT * FROM jobs WHERE client = $1 AND idempotency_key = $2";
-            let args = args![client.as_str(), idempotency_key.clone()];
-            if let Some(row) = first(self.engine.read(find, args).await?) {
-                let job = job(&row)?;
-                return if row.some("digest", Row::text)? == *digest {
-                    Ok(Submitted::Repeated(job))
-                } else {
-                    Err(JobError::IdempotencyMismatch { job: job.id })
-                };
+            let key = idempotency_key.as_deref().unwrap_or_default();
+            if let Some(first) = self.keyed(client, key).await? {
+                return first.of(digest).map(Submitted::Repeated);
             }
             // The earlier job was deleted between the two statements: the key is free again.
         }
+    }
+
+    /// The job of a client's idempotency key.
+    pub(crate) async fn keyed(&self, client: &str, key: &str) -> Result<Option<Keyed>, JobError> {
+        let find = "SELECT * FROM jobs WHERE client = $1 AND idempotency_key = $2";
+        let Some(row) = first(self.engine.read(find, args![client, key]).await?) else {
+            return Ok(None);
+        };
+        Ok(Some(Keyed {
+            job: job(&row)?,
+            digest: row.some("digest", Row::text)?,
+        }))
     }
 
     /// A job.

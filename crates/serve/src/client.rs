@@ -105,6 +105,13 @@ impl App {
         caller.client(self.sharing)
     }
 
+    /// The text under which a caller's jobs are kept.
+    pub fn job_owner(&self, caller: &Caller) -> String {
+        self.client(caller)
+            .as_ref()
+            .map_or_else(String::new, ClientId::text)
+    }
+
     /// A caller as it opens sessions.
     pub fn opener(&self, caller: &Caller) -> Opener {
         Opener {

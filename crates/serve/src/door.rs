@@ -24,12 +24,15 @@ const WORKER_ROUTES: [&str; 9] = [
 ];
 /// The methods of gRPC.
 const GRPC: &str = "/darn.v1.Darn/{method}";
+/// That one of them which is `POST /inpaint`.
+const GRPC_INPAINT: &str = "/darn.v1.Darn/Inpaint";
 
 /// Refuses a request that this process cannot answer because it has no workers.
 pub async fn refuse_work(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
     let matched = request.extensions().get::<MatchedPath>();
     let route = matched.map_or("", MatchedPath::as_str);
-    if app.has_workers() || !WORKER_ROUTES.contains(&route) {
+    let is_handed_over = request.uri().path() == GRPC_INPAINT;
+    if app.has_workers() || !WORKER_ROUTES.contains(&route) || is_handed_over {
         return next.run(request).await;
     }
     if route == GRPC {

@@ -1,8 +1,8 @@
 //! The gRPC service: the same jobs, limits and errors as over HTTP.
 
-use std::sync::Arc;
+use std::{pin::Pin, sync::Arc};
 
-use tonic::{Request, Response, Status, Streaming};
+use tonic::{Request, Response, Status, Streaming, codegen::tokio_stream::Stream};
 
 use super::generated::darn_server::{Darn, DarnServer};
 use super::{
@@ -11,6 +11,8 @@ use super::{
     client::Caller,
     error::RequestError,
     grpc_chunks::{ChunkStream, MAX_MESSAGE_BYTES, collect},
+    grpc_handover,
+    job_request::KeptConstraints,
     parameters::Parameters,
     scan_files::ScanFiles,
     telemetry::RequestId,
@@ -29,13 +31,16 @@ pub fn service(app: &Arc<App>) -> DarnServer<GrpcService> {
         .max_encoding_message_size(usize::MAX)
 }
 
+/// The chunks of a mended scan, from memory or from the file of a job.
+type MendedChunks = Pin<Box<dyn Stream<Item = Result<InpaintChunk, Status>> + Send>>;
+
 /// Answers gRPC calls.
 #[derive(Debug)]
 pub struct GrpcService(Arc<App>);
 
 #[tonic::async_trait]
 impl Darn for GrpcService {
-    type InpaintStream = ChunkStream<InpaintChunk>;
+    type InpaintStream = MendedChunks;
     type StripStream = ChunkStream<StripChunk>;
 
     async fn find_holes(
@@ -52,10 +57,14 @@ impl Darn for GrpcService {
     async fn inpaint(
         &self,
         request: Request<Streaming<ScanChunk>>,
-    ) -> Result<Response<ChunkStream<InpaintChunk>>, Status> {
+    ) -> Result<Response<MendedChunks>, Status> {
+        if !self.0.has_workers() {
+            let result = grpc_handover::inpaint_elsewhere(&self.0, request).await?;
+            return Ok(Response::new(Box::pin(result)));
+        }
         let id = request_id(&request);
         let mended = self.mend(request).await.map_err(|error| error.grpc(&id))?;
-        Ok(Response::new(ChunkStream::of_mended(mended)))
+        Ok(Response::new(Box::pin(ChunkStream::of_mended(mended))))
     }
 
     async fn strip(
@@ -162,13 +171,7 @@ impl GrpcService {
                 place.check_first(P::PART)?;
                 parameters = Some(P::from_message(&message)?);
             }
-            if chunk.constraints.is_some() || chunk.query.is_some() || chunk.holes.is_some() {
-                return Err(RequestError::Malformed(
-                    "Inpaint takes `constraints`, OptimizeAnchor `query`, FindHoles `holes`, none of them another's, and Strip none"
-                        .to_owned(),
-                ));
-            }
-            Ok(())
+            without_others(chunk)
         })
         .await?;
         Ok(ScanRequest {
@@ -180,13 +183,33 @@ impl GrpcService {
     }
 }
 
+/// Checks a chunk from which the call's own parameters are taken for those of other calls.
+///
+/// # Errors
+/// `Malformed`.
+pub fn without_others(chunk: &ScanChunk) -> Result<(), RequestError> {
+    if chunk.constraints.is_some() || chunk.query.is_some() || chunk.holes.is_some() {
+        return Err(RequestError::Malformed(
+            "Inpaint takes `constraints`, OptimizeAnchor `query`, FindHoles `holes`, none of them another's, and Strip none"
+                .to_owned(),
+        ));
+    }
+    Ok(())
+}
+
 /// Parameters as a field of a chunk.
-trait ChunkParameters: Parameters {
+pub trait ChunkParameters: Parameters {
     /// Takes their message out of a chunk.
     fn take(chunk: &mut ScanChunk) -> Option<Self::Message>;
 }
 
 impl ChunkParameters for Constraints {
+    fn take(chunk: &mut ScanChunk) -> Option<v1::Constraints> {
+        chunk.constraints.take()
+    }
+}
+
+impl ChunkParameters for KeptConstraints {
     fn take(chunk: &mut ScanChunk) -> Option<v1::Constraints> {
         chunk.constraints.take()
     }

@@ -24,11 +24,11 @@ use super::{
     grpc::request_id,
     grpc_chunks::{CHUNK_BYTES, Chunks, MAX_MESSAGE_BYTES},
     job_events::{self, Listener},
+    job_input::Inlet,
     job_message::message,
-    job_quota,
     job_request::{JobLabels, JobRequest, KeptConstraints},
     job_routes::{DEFAULT_LIMIT, KnownJob, MAX_LIMIT, page},
-    job_upload::{Pieces, store},
+    job_upload::{Pieces, take_pieces},
     key_file::Scope,
     parameters::Parameters,
     uploads::BodySize,
@@ -83,12 +83,7 @@ impl jobs_server::Jobs for GrpcJobs {
     async fn result(&self, request: Request<v1::JobId>) -> Answer<FileChunks> {
         let opened = async {
             let KnownJob { jobs, job } = self.known(&request, &request.get_ref().id).await?;
-            let (_, file) = jobs.result(job.id).await?;
-            Ok(FileChunks {
-                report: Some(report(&jobs, job.id).await?),
-                file,
-                piece: vec![0; CHUNK_BYTES],
-            })
+            FileChunks::of_result(&jobs, job.id).await
         };
         answer(request_id(&request), opened.await)
     }
@@ -171,7 +166,6 @@ impl GrpcJobs {
             return Err(RequestError::InsufficientScope { scope: Scope::Jobs });
         }
         let jobs = self.jobs()?;
-        job_quota::check(jobs, &caller).await?;
         let upload = app.upload_slot_for(BodySize::Large, app.client(&caller))?;
         let mut pieces = JobChunks {
             chunks: Chunks::new(app, request.into_inner()),
@@ -179,16 +173,19 @@ impl GrpcJobs {
             caller: &caller,
             labels: JobLabels::default(),
             constraints: None,
+            first: None,
         };
-        let input = store(jobs, &mut pieces).await?;
+        // The labels come with it.
+        pieces.first = (&mut pieces).next().await?;
+        let inlet = Inlet::open(app, jobs, &caller, &pieces.labels).await?;
+        let input = take_pieces(inlet, &mut pieces).await?;
         if input.bytes() == 0 {
             return Err(RequestError::EmptyBody);
         }
         let asked = JobRequest::new(pieces.constraints, ScanForm::AsReceived);
-        let submission = pieces.labels.submission(upload.client(), &asked);
-        let turn = job_quota::turn(jobs, &caller).await?;
-        let job = jobs.submit_received(submission, input).await?.into_job();
-        drop(turn);
+        let submission = pieces.labels.submission(app.job_owner(&caller), &asked);
+        let job = input.submit(jobs, &caller, submission).await?;
+        drop(upload);
         Ok(message(jobs, &job).await?)
     }
 }
@@ -200,10 +197,15 @@ struct JobChunks<'a> {
     caller: &'a Caller,
     labels: JobLabels,
     constraints: Option<KeptConstraints>,
+    /// The data of the first chunk, while it was looked at and not handed on.
+    first: Option<Bytes>,
 }
 
 impl Pieces for &mut JobChunks<'_> {
     async fn next(&mut self) -> Result<Option<Bytes>, RequestError> {
+        if let Some(first) = self.first.take() {
+            return Ok(Some(first));
+        }
         let Some((chunk, place)) = self.chunks.next().await? else {
             return Ok(None);
         };
@@ -272,6 +274,21 @@ pub struct FileChunks {
     report: Option<v1::Report>,
     file: BlobFile,
     piece: Vec<u8>,
+}
+
+impl FileChunks {
+    /// That of a job.
+    ///
+    /// # Errors
+    /// `JobUnfinished`, `JobWrongState` or `JobExpired`.
+    pub async fn of_result(jobs: &Jobs, job: uuid::Uuid) -> Result<Self, RequestError> {
+        let (_, file) = jobs.result(job).await?;
+        Ok(Self {
+            report: Some(report(jobs, job).await?),
+            file,
+            piece: vec![0; CHUNK_BYTES],
+        })
+    }
 }
 
 impl Stream for FileChunks {

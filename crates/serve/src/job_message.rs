@@ -6,11 +6,12 @@ use serde_json::Value;
 use uuid::Uuid;
 
 use super::{
+    error::RequestError,
     job_worker::{READING, WAITING},
     response::KeptAnswer,
     webhook,
 };
-use darn_contract::{codes, v1};
+use darn_contract::{FieldError, codes, port::Refusal, v1};
 
 /// The messages of jobs, in their order.
 ///
@@ -155,6 +156,26 @@ fn problem(job: &Job) -> Option<v1::JobProblem> {
                 detail: text(&error["detail"]),
             })
             .collect(),
+    })
+}
+
+/// The failure of a job as the error that a request would have been answered with; `Internal` unless it has failed.
+pub fn failure(job: &Job) -> RequestError {
+    let Some(problem) = problem(job) else {
+        return RequestError::Internal;
+    };
+    let code = codes::ALL.iter().find(|code| code.word == problem.code);
+    let Some(code) = code.filter(|code| **code != codes::INTERNAL) else {
+        return RequestError::Internal;
+    };
+    let field = |fault: v1::JobFault| FieldError {
+        pointer: fault.pointer,
+        detail: fault.detail,
+    };
+    RequestError::Refused(Refusal {
+        code: *code,
+        detail: problem.detail,
+        fields: problem.errors.into_iter().map(field).collect(),
     })
 }
 

@@ -23,23 +23,10 @@ pub async fn check(jobs: &Jobs, caller: &Caller) -> Result<(), RequestError> {
     Ok(())
 }
 
-/// Waits until no other request makes a job of this caller wait, and checks that one more may. As long as the guard is held, this process
-/// makes none wait but its holder.
-///
-/// # Errors
-/// Those of [`check`].
-pub async fn turn<'a>(
-    jobs: &Jobs,
-    caller: &'a Caller,
-) -> Result<Option<MutexGuard<'a, ()>>, RequestError> {
-    let Some(key) = caller
-        .key
-        .as_ref()
-        .filter(|key| key.limits.waiting_jobs.is_some())
-    else {
-        return Ok(None);
-    };
-    let turn = key.usage.handing_over.lock().await;
-    check(jobs, caller).await?;
-    Ok(Some(turn))
+/// Waits until no other request makes a job of this caller wait; [`check`] is to follow. As long as the guard is held, this process makes none
+/// wait but its holder. `None` for a caller without such a limit.
+pub async fn turn(caller: &Caller) -> Option<MutexGuard<'_, ()>> {
+    let key = caller.key.as_ref()?;
+    key.limits.waiting_jobs?;
+    Some(key.usage.handing_over.lock().await)
 }

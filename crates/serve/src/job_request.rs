@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     app::App,
-    client::{Caller, Client, ClientId},
+    client::Caller,
     error::{ParameterKind, RequestError},
     parameters::Parameters,
     response, traces,
@@ -169,6 +169,11 @@ impl JobLabels {
         })
     }
 
+    /// The client's key.
+    pub fn key(&self) -> Option<&str> {
+        self.key.as_deref()
+    }
+
     /// Checks where the webhook may go, and that its requests can be signed.
     ///
     /// # Errors
@@ -182,10 +187,10 @@ impl JobLabels {
         Ok(Self { webhook, ..self })
     }
 
-    /// A submission of a client.
-    pub fn submission(self, client: &Client, request: &JobRequest) -> Submission {
+    /// A submission of the client whose jobs are kept under this text.
+    pub fn submission(self, owner: String, request: &JobRequest) -> Submission {
         Submission {
-            client: client.as_ref().map_or_else(String::new, ClientId::text),
+            client: owner,
             idempotency_key: self.key,
             name: self.name,
             priority: self.priority,

@@ -23,6 +23,7 @@ use super::{
     error::RequestError,
     job_answer,
     job_events::{self, Listener},
+    job_input::Inlet,
     job_message::{message, messages, problem_document},
     job_quota,
     job_request::{JobLabels, JobRequest},
@@ -113,8 +114,12 @@ impl KnownJob {
     /// # Errors
     /// `JobWrongState`, `JobExpired` or `Quota`.
     pub async fn retry(&self, caller: &Caller) -> Result<v1::Job, RequestError> {
-        let _turn = job_quota::turn(&self.jobs, caller).await?;
+        let turn = job_quota::turn(caller).await;
+        if turn.is_some() {
+            job_quota::check(&self.jobs, caller).await?;
+        }
         let retried = self.jobs.retry(self.job.id).await?;
+        drop(turn);
         Ok(message(&self.jobs, &retried).await?)
     }
 }
@@ -206,27 +211,31 @@ async fn hand_over(
 ) -> Result<Job, RequestError> {
     let headers = request.headers().clone();
     let caller = Caller::of(request.extensions());
-    if let Err(error) = job_quota::check(jobs, &caller).await {
-        body::discard(request, &app.limits);
-        return Err(error);
-    }
+    let inlet = match Inlet::open(app, jobs, &caller, &labels).await {
+        Ok(inlet) => inlet,
+        Err(error) => {
+            body::discard(request, &app.limits);
+            return Err(error);
+        }
+    };
     let JobUpload {
         input,
         files,
         constraints,
         permit,
-    } = job_upload::receive(app, jobs, request).await?;
+    } = job_upload::receive(app, inlet, request).await?;
     let asked = JobRequest::new(constraints, files.answer(&headers).form);
-    let submission = labels.submission(permit.client(), &asked);
-    let turn = job_quota::turn(jobs, &caller).await?;
-    let job = jobs.submit_received(submission, input).await?.into_job();
-    drop(turn);
+    let submission = labels.submission(app.job_owner(&caller), &asked);
+    let job = input.submit(jobs, &caller, submission).await?;
     drop(permit);
     Ok(job)
 }
 
 /// The job once it is finished, or as it is after this time or when the service shuts down.
-async fn finished_within(
+///
+/// # Errors
+/// `NoSuchJob` once it is deleted; `JobsUnavailable`.
+pub async fn finished_within(
     app: &App,
     jobs: &Jobs,
     mut job: Job,
@@ -274,7 +283,10 @@ async fn list(
     caller: Caller,
     uri: Uri,
 ) -> Result<Response, RequestError> {
-    let page = page(&jobs, &caller, list_query(uri.query())?).await?;
+    let page = match list_query(uri.query())? {
+        Some(query) => page(&jobs, &caller, query).await?,
+        None => v1::JobList::default(),
+    };
     Ok(response::json_response(response::json(&page)))
 }
 
@@ -298,7 +310,9 @@ pub async fn page(
     })
 }
 
-fn list_query(query: Option<&str>) -> Result<ListQuery, RequestError> {
+/// The page that a URL's query asks for; `None` for one that no job is on.
+fn list_query(query: Option<&str>) -> Result<Option<ListQuery>, RequestError> {
+    let mut may_have_jobs = true;
     let mut wanted = ListQuery {
         client: None,
         state: None,
@@ -308,11 +322,13 @@ fn list_query(query: Option<&str>) -> Result<ListQuery, RequestError> {
     let wrong = |detail: String| Err(RequestError::Malformed(detail));
     for (name, value) in form_urlencoded::parse(query.unwrap_or_default().as_bytes()) {
         match name.as_ref() {
+            // What pipelines call a job whose scan has not come: here a job is made with its scan, and waits at once.
+            "state" if value.eq_ignore_ascii_case("created") => may_have_jobs = false,
             "state" => match value.to_ascii_lowercase().parse() {
                 Ok(state) => wanted.state = Some(state),
                 Err(_) => {
                     return wrong(format!(
-                        "`{}` is no state of a job; the states are waiting, running, done, error and cancelled",
+                        "`{}` is no state of a job; the states are waiting, running, done, error and cancelled, and no job is ever `created`",
                         excerpt(&value)
                     ));
                 }
@@ -337,7 +353,7 @@ fn list_query(query: Option<&str>) -> Result<ListQuery, RequestError> {
             }
         }
     }
-    Ok(wanted)
+    Ok(may_have_jobs.then_some(wanted))
 }
 
 async fn describe(KnownJob { jobs, job }: KnownJob) -> Result<Response, RequestError> {

@@ -10,7 +10,7 @@ use axum::{
     http::request::Parts,
 };
 use bytes::Bytes;
-use darn_jobs::{Jobs, ReceivedInput};
+use darn_jobs::ReceivedInput;
 use tokio::{
     io::{AsyncReadExt as _, AsyncWriteExt as _, DuplexStream, duplex},
     try_join,
@@ -27,6 +27,7 @@ use super::{
     counted::{CountedBytes, take},
     digest::{ExpectedDigests, RunningDigests},
     error::RequestError,
+    job_input::{Inlet, JobInput},
     job_request::KeptConstraints,
     parameters::{self, Parameters},
     request_limits::RequestLimits,
@@ -43,8 +44,8 @@ const UPLOAD_BYTES: usize = 4 * PIPE_BYTES;
 /// A scan that has been received for a job.
 #[derive(Debug)]
 pub struct JobUpload {
-    /// Its file.
-    pub input: ReceivedInput,
+    /// Its file, or its digest.
+    pub input: JobInput,
     /// In how many files it came.
     pub files: ScanFiles,
     /// The constraints that came with it.
@@ -54,14 +55,22 @@ pub struct JobUpload {
 }
 
 /// What came, apart from the place among uploads.
-type Taken = (ReceivedInput, ScanFiles, Option<KeptConstraints>);
+type Taken = (JobInput, ScanFiles, Option<KeptConstraints>);
 
 /// Receives a request with a scan that becomes a job, whatever waits in the queue.
 ///
 /// # Errors
 /// `UploadsFull`, `UploadShareFull` or `Draining` before the body is read, and those of reading it; `StorageFull`.
-pub async fn receive(app: &App, jobs: &Jobs, request: Request) -> Result<JobUpload, RequestError> {
-    if !matches!(ContentCoding::of(request.headers()), Ok(None)) {
+pub async fn receive(
+    app: &App,
+    inlet: Inlet<'_>,
+    request: Request,
+) -> Result<JobUpload, RequestError> {
+    let is_plain = matches!(ContentCoding::of(request.headers()), Ok(None));
+    // What is not stored cannot be read back when its further files have come.
+    let may_need_memory = matches!(inlet, Inlet::Compare(_))
+        && matches!(scan_body(request.headers()), Ok(ScanBody::Form));
+    if !is_plain || may_need_memory {
         let ScanRequest {
             scan,
             files,
@@ -69,7 +78,7 @@ pub async fn receive(app: &App, jobs: &Jobs, request: Request) -> Result<JobUplo
             upload,
         } = body::receive_job_scan::<KeptConstraints>(app, request).await?;
         return Ok(JobUpload {
-            input: jobs.receive(&scan[..]).await?,
+            input: inlet.take(&scan[..]).await?,
             files,
             constraints: parameters,
             permit: upload,
@@ -83,7 +92,7 @@ pub async fn receive(app: &App, jobs: &Jobs, request: Request) -> Result<JobUplo
         }
     };
     let (parts, mut body) = request.into_parts();
-    let taken = take_in(&app.limits, jobs, &parts, &mut body).await;
+    let taken = take_in(&app.limits, inlet, &parts, &mut body).await;
     if taken
         .as_ref()
         .is_err_and(|error| !matches!(error, RequestError::BodyTimeout { .. }))
@@ -101,7 +110,7 @@ pub async fn receive(app: &App, jobs: &Jobs, request: Request) -> Result<JobUplo
 
 async fn take_in(
     limits: &RequestLimits,
-    jobs: &Jobs,
+    inlet: Inlet<'_>,
     parts: &Parts,
     body: &mut Body,
 ) -> Result<Taken, RequestError> {
@@ -118,8 +127,8 @@ async fn take_in(
     let (writer, reader) = duplex(PIPE_BYTES);
     let taken = async {
         match kind {
-            ScanBody::Form => form(limits, jobs, parts, reader).await,
-            ScanBody::Bare | ScanBody::Untold => bare(jobs, parts, kind, reader).await,
+            ScanBody::Form => form(limits, inlet, parts, reader).await,
+            ScanBody::Bare | ScanBody::Untold => bare(inlet, parts, kind, reader).await,
         }
     };
     let ((), (input, files, constraints)) = try_join!(feed(pieces, writer), taken)?;
@@ -131,7 +140,7 @@ async fn take_in(
 
 /// A body that is the scan.
 async fn bare(
-    jobs: &Jobs,
+    inlet: Inlet<'_>,
     parts: &Parts,
     kind: ScanBody,
     mut reader: DuplexStream,
@@ -142,14 +151,14 @@ async fn bare(
     // A pipe does not fail.
     read.map_err(|_| RequestError::Internal)?;
     kind.check_head(&parts.headers, &head)?;
-    let input = jobs.receive(head.as_slice().chain(reader)).await?;
+    let input = inlet.take(head.as_slice().chain(reader)).await?;
     Ok((input, ScanFiles::of(&head), None))
 }
 
 /// A body of multipart/form-data.
 async fn form(
     limits: &RequestLimits,
-    jobs: &Jobs,
+    inlet: Inlet<'_>,
     parts: &Parts,
     reader: DuplexStream,
 ) -> Result<Taken, RequestError> {
@@ -168,7 +177,7 @@ async fn form(
                 field,
                 head: &mut head,
             };
-            let input = store(jobs, pieces).await?;
+            let input = take_pieces(inlet, pieces).await?;
             scan = Some((input, ScanFiles::of(&head)));
             continue;
         }
@@ -185,10 +194,14 @@ async fn form(
     if files.is_empty() || input.bytes() == 0 {
         return Ok((input, kind, constraints));
     }
-    let scan = read_back(&input, limits).await?;
+    // A scan that is compared is not taken in here when it comes in a form.
+    let JobInput::Stored(stored) = &input else {
+        return Err(RequestError::Internal);
+    };
+    let scan = read_back(stored, limits).await?;
     let zip = scan_files::bundle::<KeptConstraints>(scan, files, &limits.memory).await?;
     drop(input);
-    Ok((jobs.receive(&zip[..]).await?, ScanFiles::Parts, constraints))
+    Ok((inlet.take(&zip[..]).await?, ScanFiles::Parts, constraints))
 }
 
 async fn read_field(
@@ -232,14 +245,13 @@ pub trait Pieces: Send {
     fn next(&mut self) -> impl Future<Output = Result<Option<Bytes>, RequestError>> + Send;
 }
 
-/// Writes what comes in pieces into the input of a job.
+/// Takes what comes in pieces as the input of a job.
 ///
 /// # Errors
 /// Those of the pieces; `StorageFull`.
-pub async fn store(jobs: &Jobs, pieces: impl Pieces) -> Result<ReceivedInput, RequestError> {
+pub async fn take_pieces(inlet: Inlet<'_>, pieces: impl Pieces) -> Result<JobInput, RequestError> {
     let (writer, reader) = duplex(PIPE_BYTES);
-    let stored = async { Ok::<_, RequestError>(jobs.receive(reader).await?) };
-    let ((), input) = try_join!(feed(pieces, writer), stored)?;
+    let ((), input) = try_join!(feed(pieces, writer), inlet.take(reader))?;
     Ok(input)
 }
 

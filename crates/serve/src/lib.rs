@@ -32,11 +32,13 @@ pub mod generated {
 }
 mod grpc;
 mod grpc_chunks;
+mod grpc_handover;
 mod grpc_jobs;
 mod healthcheck;
 mod instance;
 mod job_answer;
 mod job_events;
+mod job_input;
 mod job_message;
 mod job_quota;
 mod job_request;

@@ -71,7 +71,14 @@ pub(super) fn webhook() -> Value {
 
 /// `GET /jobs`.
 pub(super) fn list() -> Value {
-    let states = ["waiting", "running", "done", "error", "cancelled"];
+    let states = [
+        "created",
+        "waiting",
+        "running",
+        "done",
+        "error",
+        "cancelled",
+    ];
     let page = answer(
         "200",
         "A page of jobs, the newest first",
@@ -81,7 +88,12 @@ pub(super) fn list() -> Value {
         "summary": "List jobs",
         "operationId": "listJobs",
         "parameters": [
-            query("state", json!({ "type": "string", "enum": states }), "Only jobs in this state"),
+            query(
+                "state",
+                json!({ "type": "string", "enum": states }),
+                "Only jobs in this state. None is ever `created`: a job is made when its scan is on disk, and waits from then on; the word is taken \
+                    for pipelines that ask for it",
+            ),
             query("from", json!({ "type": "string" }), "The `next` of the page before"),
             query(
                 "limit",
@@ -194,7 +206,7 @@ pub(super) fn preferences() -> Value {
             "name": "prefer",
             "in": "header",
             "description": "`respond-async`: a job is made, and answered with (202) unless the mend ends within `wait=N` seconds \
-                (RFC 7240). Passed over by a service that keeps no jobs",
+                (RFC 7240), and `Preference-Applied` says so. Passed over by a service that keeps no jobs, and by all other routes",
             "schema": { "type": "string" },
         },
         key(),
@@ -250,7 +262,8 @@ fn key() -> Value {
     json!({
         "name": "idempotency-key",
         "in": "header",
-        "description": "A repeated request with the same key and payload is answered with the first one's job; keys of different client \
+        "description": "A repeated request with the same key and payload is answered with the first one's job, also where no more jobs may wait or \
+            the disk is full; keys of different client \
             addresses are apart",
         "schema": { "type": "string", "maxLength": 255 },
     })
