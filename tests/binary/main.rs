@@ -1,10 +1,16 @@
 //! The binary as a user meets it: `darn serve` on a real socket, and the commands beside it.
 
 mod files;
+#[cfg(target_os = "linux")]
+mod full_disk;
+mod kills;
 mod many;
 #[path = "../../crates/jobs/tests/laws/postgres.rs"]
 mod postgres;
 mod running;
+#[cfg(target_os = "linux")]
+#[path = "../../crates/jobs/tests/laws/small_disk.rs"]
+mod small_disk;
 mod traces;
 mod webhooks;
 

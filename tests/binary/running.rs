@@ -38,10 +38,17 @@ impl Service {
 
     /// The same with variables of the environment, too.
     pub fn start_in(variables: &[(&str, &str)], settings: &[&str]) -> Service {
-        let mut child = darn()
+        let mut command = darn();
+        command
             .args(["serve", "--listen", "127.0.0.1:0"])
             .args(settings)
-            .envs(variables.iter().copied())
+            .envs(variables.iter().copied());
+        Service::of(command)
+    }
+
+    /// Starts a command that becomes a `darn serve` on a free port.
+    pub fn of(mut command: Command) -> Service {
+        let mut child = command
             .stderr(Stdio::piped())
             .stdout(Stdio::null())
             .spawn()

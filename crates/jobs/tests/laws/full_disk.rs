@@ -1,45 +1,31 @@
 //! A disk that is full: a file system of a few megabytes, in a mount namespace of its own.
 
-use std::{path::PathBuf, process::Command};
+use std::path::PathBuf;
 
 use darn_jobs::{JobError, Jobs, Outcome, Place, Settings, State};
 use tempfile::TempDir;
 
-use crate::bench::{claim, failed, product, submission, submit};
+use crate::{
+    bench::{claim, failed, product, submission, submit},
+    small_disk::on_small_disk,
+};
 
-/// Mounts the small disk, which nobody else sees, and runs the test below on it.
-const ON_A_SMALL_DISK: &str = r#"
-mount -t tmpfs -o size=24m darn-full-disk "$1" && cd "$1" &&
-exec "$0" --exact full_disk::on_a_small_disk --ignored --nocapture
-"#;
-
-/// How a namespace is made in which a file system can be mounted: by anybody, or by root where others may not.
-const NAMESPACES: [&[&str]; 2] = [&["--user", "--map-root-user", "--mount"], &["--mount"]];
-
-fn in_namespace(arguments: &[&str]) -> Command {
-    let mut command = Command::new("unshare");
-    command.args(arguments).args(["sh", "-c"]);
-    command
-}
-
-/// Containers may forbid mounts; the law is then not looked at, and the output says so.
 #[test]
 fn a_full_disk_refuses_what_is_new_and_lets_everything_end() {
     let folder = TempDir::new().unwrap();
-    let may_mount = |arguments: &&&[&str]| {
-        let mut trial = in_namespace(arguments);
-        trial.args([r#"mount -t tmpfs -o size=1m darn-trial "$0""#]);
-        let ran = trial.arg(folder.path()).output();
-        ran.is_ok_and(|ran| ran.status.success())
-    };
-    let Some(namespace) = NAMESPACES.iter().find(may_mount) else {
-        eprintln!("not looked at: this system lets nobody mount a file system in a namespace");
+    let this = std::env::current_exe().unwrap();
+    let Some(mut command) = on_small_disk(folder.path(), "24m", &this) else {
         return;
     };
-    let ran = in_namespace(namespace)
-        .arg(ON_A_SMALL_DISK)
-        .arg(std::env::current_exe().unwrap())
-        .arg(folder.path())
+    let test = [
+        "--exact",
+        "full_disk::on_a_small_disk",
+        "--ignored",
+        "--nocapture",
+    ];
+    let ran = command
+        .args(test)
+        .env(DISK, folder.path())
         .output()
         .unwrap();
     let output = format!(
@@ -53,9 +39,18 @@ fn a_full_disk_refuses_what_is_new_and_lets_everything_end() {
     );
 }
 
+/// The variable that names the small disk.
+const DISK: &str = "DARN_TEST_SMALL_DISK";
+
+fn disk() -> PathBuf {
+    std::env::var_os(DISK)
+        .expect("the test above sets it")
+        .into()
+}
+
 /// Takes all space that is left, as anything else on the disk might.
 fn fill() -> PathBuf {
-    let path = std::env::current_dir().unwrap().join("filler");
+    let path = disk().join("filler");
     let mut file = std::fs::OpenOptions::new()
         .create(true)
         .append(true)
@@ -70,7 +65,7 @@ fn fill() -> PathBuf {
 #[tokio::test]
 #[ignore = "run by the test above, on a disk of its own"]
 async fn on_a_small_disk() {
-    let folder = std::env::current_dir().unwrap();
+    let folder = disk();
     assert!(
         std::fs::read_dir(&folder).unwrap().next().is_none(),
         "this is not the small disk"

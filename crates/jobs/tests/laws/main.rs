@@ -17,3 +17,5 @@ mod postgres;
 mod requests;
 mod running;
 mod s3;
+#[cfg(target_os = "linux")]
+mod small_disk;
