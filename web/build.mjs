@@ -5,9 +5,9 @@
 //   node build.mjs example DIRECTORY  writes the example of clients/typescript there
 //
 // The libraries go into a file of their own, vendor.js, so that a change of our own code leaves it as it is. The worker has what it needs itself:
-// Lit does not run there.
+// Lit does not run there. Draco's decoder is in draco.js, which is loaded when a scan needs it.
 
-import { cpSync, mkdirSync, rmSync } from 'node:fs';
+import { cpSync, mkdirSync, readFileSync, rmSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { build } from 'esbuild';
@@ -21,6 +21,14 @@ const apart = (name) => ({
   name: `${name}-apart`,
   setup(bundle) {
     bundle.onResolve({ filter: new RegExp(`/${name}\\.js$`) }, () => ({ path: `./${name}.js`, external: true }));
+  },
+});
+
+/** A script that is handed on as it is, not run here. */
+const asText = (file) => ({
+  name: 'as-text',
+  setup(bundle) {
+    bundle.onLoad({ filter: file }, ({ path }) => ({ contents: readFileSync(path, 'utf8'), loader: 'text' }));
   },
 });
 
@@ -49,7 +57,15 @@ if (isExample) {
     ...shared,
     entryPoints: ['src/main.ts'],
     outfile: join(out, 'editor/main.js'),
-    plugins: [apart('vendor')],
+    plugins: [apart('vendor'), apart('draco')],
+  });
+  await build({
+    ...shared,
+    entryPoints: ['src/draco.ts'],
+    outfile: join(out, 'editor/draco.js'),
+    loader: { '.wasm': 'binary' },
+    plugins: [asText(/draco_wasm_wrapper\.js$/)],
+    banner: { js: `/*! ${readFileSync(join(here, 'licences/draco.txt'), 'utf8').trim()} */` },
   });
   await build({
     ...shared,

@@ -39,5 +39,6 @@ export { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 export { Line2 } from 'three/examples/jsm/lines/Line2.js';
 export { LineGeometry } from 'three/examples/jsm/lines/LineGeometry.js';
 export { LineMaterial } from 'three/examples/jsm/lines/LineMaterial.js';
+export { DRACOLoader } from 'three/examples/jsm/loaders/DRACOLoader.js';
 export { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
 export { MeshoptDecoder } from 'three/examples/jsm/libs/meshopt_decoder.module.js';

@@ -104,3 +104,12 @@ export function sheetInColours() {
   ];
   return Buffer.from(JSON.stringify(gltf));
 }
+
+/** A sheet with one hole as a glTF, `sheet.gltf`, whose data is in a file of its own, `sheet.bin`. */
+export function sheetInFiles() {
+  const glb = sheetGlb(30, (i, j) => Math.hypot(i - 14.5, j - 14.5) < 4.3);
+  const end = 20 + glb.readUInt32LE(12);
+  const gltf = JSON.parse(glb.subarray(20, end));
+  gltf.buffers[0].uri = 'sheet.bin';
+  return { gltf: Buffer.from(JSON.stringify(gltf)), bin: glb.subarray(end + 8) };
+}

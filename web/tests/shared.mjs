@@ -45,16 +45,18 @@ export async function saved(editor, page) {
   return { name: download.suggestedFilename(), bytes: readFileSync(await download.path()) };
 }
 
-/** Drops a file on the page. */
-export async function drop(page, name, bytes) {
+/** Drops a file on the page, or several: then each is a name and bytes. */
+export async function drop(page, name, bytes, others = []) {
   const transfer = await page.evaluateHandle(
-    ([fileName, base64]) => {
+    (files) => {
       const transfer = new DataTransfer();
-      const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
-      transfer.items.add(new File([bytes], fileName));
+      for (const [fileName, base64] of files) {
+        const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+        transfer.items.add(new File([bytes], fileName));
+      }
       return transfer;
     },
-    [name, bytes.toString('base64')],
+    [[name, bytes], ...others].map(([fileName, content]) => [fileName, content.toString('base64')]),
   );
   await page.dispatchEvent('darn-editor', 'drop', { dataTransfer: transfer });
 }

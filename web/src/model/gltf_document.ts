@@ -18,6 +18,7 @@ interface Primitive {
 
 /** The parts of glTF 2.0 that are read. */
 export interface GltfDocument {
+  readonly extensionsUsed?: readonly string[];
   readonly images?: readonly unknown[];
   readonly meshes?: readonly { readonly primitives?: readonly Primitive[] }[];
   readonly materials?: readonly {

@@ -4,7 +4,6 @@ import {
   BufferAttribute,
   type BufferGeometry,
   DoubleSide,
-  GLTFLoader,
   Group,
   type Intersection,
   type Material,
@@ -13,7 +12,6 @@ import {
   MeshBVH,
   MeshBasicMaterial,
   MeshStandardMaterial,
-  MeshoptDecoder,
   type Raycaster,
   type Texture,
   Vector3,
@@ -24,6 +22,7 @@ import { Middles, indexWithout } from './cut_faces.js';
 import type { VertexNumbers } from './curvature.js';
 import { GeometryJobs, type PlainMesh } from './geometry_jobs.js';
 import type { Heat } from './heat_colors.js';
+import { loadScene } from './scan_loader.js';
 import type { StretchCells } from './stretch.js';
 
 /** How surfaces are drawn. */
@@ -76,8 +75,7 @@ export class ScanModel {
 
   /** Reads a GLB, or a glTF with data URIs. */
   static async load(bytes: ArrayBuffer): Promise<ScanModel> {
-    const gltf = await new GLTFLoader().setMeshoptDecoder(MeshoptDecoder).parseAsync(bytes, '');
-    return new ScanModel(gltf.scene);
+    return new ScanModel(await loadScene(bytes));
   }
 
   get meshes(): Mesh[] {
