@@ -196,7 +196,10 @@ inEditor('everything can be done by keyboard', async (editor, page) => {
   await page.keyboard.press('Space');
   await press('button', 'Find its place');
   await page.getByRole('alert').waitFor();
-  assert.match(await page.getByRole('alert').textContent(), /reach/);
+  const refusal = await page.getByRole('alert').locator('p').textContent();
+  assert.match(refusal, /^Anchor 1: the cloth stays .* can reach.*\nMove the point nearer .*$/);
+  assert.equal(refusal.split('the cloth stays').length, 2, 'it is said once');
+  assert.doesNotMatch(refusal, /\/anchors/);
 });
 
 inEditor(

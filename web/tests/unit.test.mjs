@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { load } from './sources.mjs';
 
-const { Latest, Service, partsOf, problemOf } = await load('client.ts');
+const { Latest, Service, describeError, partsOf, problemOf } = await load('client.ts');
 const { History } = await load('model/history.ts');
 const { boundaryLines, linesOfLoops } = await load('scene/boundary.ts');
 const { readConstraints, carried, selectionOf, statelessMessageOf } = await load('model/constraints.ts');
@@ -351,6 +351,24 @@ test('a problem document is read, and an answer of a proxy is named by its statu
   const other = problemOf(502, null, '<html>');
   assert.match(other.message, /502/);
   assert.equal(other.retryAfter, undefined);
+});
+
+test('every fault of a refused request is told once, with its place in words', () => {
+  const told = (code, detail, ...errors) =>
+    describeError(problemOf(422, null, JSON.stringify({ code, detail, errors })));
+  const far = { pointer: '/anchors/1', detail: 'the cloth stays 4.2 away from it' };
+  assert.equal(
+    told('anchor_out_of_reach', '1 anchor(s) cannot be met: /anchors/1: the cloth stays 4.2 away from it', far),
+    'Anchor 2: the cloth stays 4.2 away from it.\nMove the point nearer to the cloth, or make the anchor soft.',
+  );
+  const twist = { pointer: '/edits/0/twist/radius', detail: '2 is above 1' };
+  assert.equal(
+    told('invalid_constraints', '/edits/0/twist/radius: 2 is above 1', twist),
+    '/edits/0/twist/radius: 2 is above 1.',
+  );
+  assert.equal(told('invalid_constraints', 'a field is wrong', twist), 'A field is wrong.\nGesture 1: 2 is above 1.');
+  assert.equal(told('invalid_constraints', 'wrong', { detail: 'no JSON' }), 'Wrong.\nThe request: no JSON.');
+  assert.equal(describeError(problemOf(400, null, '{}')), 'The service answered with status 400.');
 });
 
 test('a glTF takes the files in that it refers to, and says which one is missing', async () => {

@@ -4,7 +4,7 @@ export { type DragEvents, type HolePositions, ClothSession } from './cloth_sessi
 export { type Following, type JobLabels, type JobQuery, type Waiting, Jobs, isFinished } from './jobs.js';
 export { Latest } from './latest.js';
 export { type Part, partsOf } from './multipart.js';
-export { ProblemError, describeError, isAbort, problemOf } from './problem.js';
+export { type FieldFault, ProblemError, describeError, isAbort, problemOf } from './problem.js';
 export { type Answer, type Progress } from './requests.js';
 export { type MapEvents, type MendedPatches, type MendedPositions, Service } from './service.js';
 export type { ServiceOptions } from './transport.js';

@@ -1,7 +1,14 @@
 /** Refusals of the service, and failures to reach it, as errors for a person. */
 import type { Problem, ProblemCode } from './contract.js';
 
-/** A problem document (RFC 9457) as an error. */
+/** A field of a request that is at fault. */
+export interface FieldFault {
+  /** A JSON pointer (RFC 6901). */
+  readonly pointer?: string;
+  readonly detail?: string;
+}
+
+/** A problem document (RFC 9457) as an error. Its message is the document's `detail`, for programmers; `describeError` has words for others. */
 export class ProblemError extends Error {
   override readonly name = 'ProblemError';
 
@@ -15,6 +22,7 @@ export class ProblemError extends Error {
     detail: string,
     /** Seconds after which another try may succeed. */
     readonly retryAfter: number | undefined,
+    readonly fields: readonly FieldFault[] = [],
   ) {
     super(detail);
   }
@@ -35,18 +43,17 @@ export function problemOf(status: number, retryAfter: string | null, body: strin
   const seconds = Number(retryAfter ?? Number.NaN);
   const wait = Number.isFinite(seconds) && seconds >= 0 ? seconds : undefined;
   try {
-    const problem = JSON.parse(body) as Problem;
-    const fields = (problem.errors ?? []).map((field) => `\n${field.pointer ?? ''} ${field.detail}`);
-    return new ProblemError(status, problem.code, problem.detail + fields.join(''), wait);
+    const { code, detail, errors = [] } = JSON.parse(body) as Partial<Problem>;
+    return new ProblemError(status, code ?? '', detail ?? unknown(status), wait, errors);
   } catch {
-    return new ProblemError(status, '', `The service answered with status ${status}.`, wait);
+    return new ProblemError(status, '', unknown(status), wait);
   }
 }
 
 /** What to tell a person about any error. */
 export function describeError(error: unknown): string {
   if (error instanceof ProblemError) {
-    return sentence(error.message);
+    return problemInWords(error);
   }
   if (error instanceof TypeError && /fetch|network/i.test(error.message)) {
     return 'The service cannot be reached.';
@@ -57,6 +64,32 @@ export function describeError(error: unknown): string {
 /** Whether an error only says that the person, or a newer request, stopped it. */
 export function isAbort(error: unknown): boolean {
   return error instanceof DOMException && error.name === 'AbortError';
+}
+
+function unknown(status: number): string {
+  return `The service answered with status ${status}.`;
+}
+
+/** A refusal in words: each fault once, with its place as a person calls it. */
+function problemInWords({ code, message, fields }: ProblemError): string {
+  if (code === 'anchor_out_of_reach' && fields.length > 0) {
+    const faults = fields.map(({ pointer = '', detail = '' }) => sentence(`${placeInWords(pointer)}: ${detail}`));
+    return [...faults, 'Move the point nearer to the cloth, or make the anchor soft.'].join('\n');
+  }
+  // Most details list the faults already.
+  const others = fields.filter(({ detail = '' }) => !message.includes(detail));
+  const faults = others.map(({ pointer = '', detail = '' }) => sentence(`${placeInWords(pointer)}: ${detail}`));
+  return [sentence(message), ...faults].join('\n');
+}
+
+/** The first words of a JSON pointer into constraints, counted from 1 as people do. */
+function placeInWords(pointer: string): string {
+  const [, list = '', index = ''] = pointer.split('/');
+  const name = new Map([
+    ['anchors', 'Anchor'],
+    ['edits', 'Gesture'],
+  ]).get(list);
+  return name !== undefined && /^\d+$/.test(index) ? `${name} ${Number(index) + 1}` : pointer || 'The request';
 }
 
 function sentence(text: string): string {

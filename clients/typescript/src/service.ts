@@ -113,7 +113,8 @@ export class Service {
     request.signal = progress.signal ?? null;
     const onLine = ({ found, map, problem }: AnchorLine): void => {
       if (problem !== undefined) {
-        throw new ProblemError(problem.status ?? 500, problem.code ?? '', problem.detail ?? '', undefined);
+        const { status = 500, code = '', detail = '', errors = [] } = problem;
+        throw new ProblemError(status, code, detail, undefined, errors);
       }
       if (found !== undefined) {
         events.onFound(found);
