@@ -104,6 +104,12 @@ function Q({hole:o}){return(o.patchUvs?.length??0)>0}function $(o,e){if(!Q(o))re
     outline: 2px solid var(--accent);
     outline-offset: 2px;
   }
+  summary {
+    box-sizing: border-box;
+    min-height: 28px;
+    padding: 4px 0;
+    cursor: pointer;
+  }
   .row {
     display: flex;
     flex-wrap: wrap;

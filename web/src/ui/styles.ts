@@ -101,6 +101,12 @@ export const shared = css`
     outline: 2px solid var(--accent);
     outline-offset: 2px;
   }
+  summary {
+    box-sizing: border-box;
+    min-height: 28px;
+    padding: 4px 0;
+    cursor: pointer;
+  }
   .row {
     display: flex;
     flex-wrap: wrap;
