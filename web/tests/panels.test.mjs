@@ -1,7 +1,9 @@
 // What the panels and keys of the editor do beside the tools, in a real browser with a real darn.
 
 import assert from 'node:assert/strict';
-import { editorTests } from './shared.mjs';
+import { readFileSync } from 'node:fs';
+import { sheetWithThreeHoles } from './fixtures.mjs';
+import { drop, editorTests, saved, stateless } from './shared.mjs';
 
 const inEditor = editorTests();
 
@@ -33,3 +35,46 @@ inEditor('every target is at least 24 pixels wide and high', async (editor, page
     assert.deepEqual(await page.evaluate(smallTargets), [], key);
   }
 });
+
+inEditor(
+  'constraints are saved as a file and loaded from one, with members that have no control',
+  async (editor, page, service) => {
+    const sheet = sheetWithThreeHoles();
+    await drop(page, 'sheet.glb', sheet);
+    await page.getByText('Holes (3)').waitFor();
+    await editor.idle();
+    const ids = await editor.model((it) => [...it.chosen]);
+    const shared = { except: [ids[1]], minDiameter: 0.1, weights: 'standard', texture: 'none' };
+    await page.getByText('Constraints as JSON', { exact: true }).click();
+    const load = async (constraints) => {
+      const buffer = Buffer.from(JSON.stringify(constraints));
+      const chooser = page.waitForEvent('filechooser');
+      await editor.button('Load a file').click();
+      await (await chooser).setFiles({ name: 'sheet.constraints.json', mimeType: 'application/json', buffer });
+      await editor.idle();
+    };
+    await load(shared);
+    assert.deepEqual(await page.getByRole('alert').allTextContents(), []);
+    assert.equal(await page.getByText('✓ mended').count(), 2);
+    assert.deepEqual(await editor.model((it) => [...it.step.holes]), [ids[0], ids[2]]);
+
+    const [download] = await Promise.all([page.waitForEvent('download'), editor.button('Save as a file').click()]);
+    assert.equal(download.suggestedFilename(), 'sheet.constraints.json');
+    const text = readFileSync(await download.path(), 'utf8');
+    assert.deepEqual(JSON.parse(text), shared);
+    assert.ok((await saved(editor, page)).bytes.equals(await stateless(service, text, sheet)));
+
+    // The service checks what the editor does not know.
+    await load({ ...shared, weights: 'silk' });
+    await page.getByRole('alert').getByText(/silk/).waitFor();
+
+    await page
+      .getByRole('checkbox', { name: /Choose Hole/ })
+      .nth(0)
+      .uncheck();
+    await editor.button('Mend 1 hole').click();
+    await editor.idle();
+    const { holes, weights, minDiameter } = JSON.parse(await editor.model((it) => it.constraintsText()));
+    assert.deepEqual([holes, weights, minDiameter], [[{ id: ids[2] }], 'standard', undefined]);
+  },
+);

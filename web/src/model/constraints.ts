@@ -24,7 +24,17 @@ export interface Choice {
   readonly made: readonly MadeHole[];
   /** Whether patches that are no plausible cloth are applied, too. */
   readonly acceptDoubtful: boolean;
+  /** What a constraints file chooses in a way that has no control here, such as by size: then the service finds the holes, and this is kept for them. */
+  readonly selection: Selection | undefined;
+  /** Other members of a constraints file without a control, such as `weights` and `up`; the service checks them. */
+  readonly more: Readonly<Record<string, unknown>>;
 }
+
+/** The members of constraints that choose holes, as a file has them. */
+export type Selection = Readonly<Record<string, unknown>>;
+
+/** Those beside `holes`. */
+const SELECTING = ['fill', 'except', 'maxDiameter', 'minDiameter'] as const;
 
 export const NO_CONSTRAINTS: ClothConstraints = { anchors: [], edits: [], alternative: 0, texture: undefined };
 
@@ -61,7 +71,13 @@ export function messageOf(constraints: ClothConstraints): Constraints {
  * The choice of loops for `POST /sessions`. Holes are chosen by leaving the others out, so that one that cannot be filled is skipped; a loop
  * of another kind must be named, and the service then refuses it where it cannot be filled.
  */
-export function selectionOf(loops: readonly Loop[], { holes: chosen, made, acceptDoubtful }: Choice): Constraints {
+export function selectionOf(
+  loops: readonly Loop[],
+  { holes: chosen, made, acceptDoubtful, selection, more }: Choice,
+): Constraints {
+  if (selection !== undefined) {
+    return { ...selection, ...more, ...(acceptDoubtful && { acceptDoubtful }) };
+  }
   const id = (loop: Loop): number => loop.id ?? 0;
   const holes = loops.filter(isHole).map(id);
   const others = loops.filter((loop) => !isHole(loop) && chosen.includes(id(loop))).map((loop) => ({ id: id(loop) }));
@@ -72,6 +88,7 @@ export function selectionOf(loops: readonly Loop[], { holes: chosen, made, accep
     // Where some are named, the holes are filled only if that is said, too.
     ...(named.length > 0 && except.length < holes.length && { fill: 'holes' }),
     ...(except.length > 0 && { except }),
+    ...more,
     ...(acceptDoubtful && { acceptDoubtful }),
   };
 }
@@ -79,30 +96,29 @@ export function selectionOf(loops: readonly Loop[], { holes: chosen, made, accep
 /** The message for `POST /inpaint`, which does in one request what the editor shows. */
 export function statelessMessageOf(
   loops: readonly Loop[],
-  { holes, made, acceptDoubtful }: Choice,
+  { holes, made, acceptDoubtful, selection, more }: Choice,
   constraints: ClothConstraints,
 ): Constraints {
   // Of made holes the entries that make them are enough.
   const ofScan = holes.filter((id) => loops.some((loop) => (loop.id ?? 0) === id));
   return {
-    holes: [...ofScan.map((id) => ({ id })), ...made],
+    ...(selection ?? { holes: [...ofScan.map((id) => ({ id })), ...made] }),
+    ...more,
     ...(acceptDoubtful && { acceptDoubtful }),
     ...messageOf(constraints),
   };
 }
 
-/** A constraints file: the holes that it chooses by id, if it chooses any, those that it makes, and the rest. */
-export interface ConstraintsFile {
+/** A constraints file: the holes that it chooses by id, if it chooses any so, those that it makes, and the rest. */
+export interface ConstraintsFile extends Omit<Choice, 'holes'> {
   readonly holes: readonly number[] | undefined;
-  readonly made: readonly MadeHole[];
-  readonly acceptDoubtful: boolean;
   readonly constraints: ClothConstraints;
 }
 
 /**
  * Reads constraints as JSON. The service checks the values; here only what the editor itself needs is checked.
  *
- * @throws When the text is not JSON, or has parts that the editor cannot show.
+ * @throws When the text is not JSON, or has parts of another form than the editor shows.
  */
 export function readConstraints(text: string): ConstraintsFile {
   let value: unknown;
@@ -123,10 +139,6 @@ export function readConstraints(text: string): ConstraintsFile {
     texture,
     ...others
   } = value as Record<string, unknown>;
-  const unknown = Object.keys(others);
-  if (unknown.length > 0) {
-    throw new Error(`The editor does not use: ${unknown.join(', ')}.`);
-  }
   if (!isObjects(anchors) || !isObjects(edits)) {
     throw new Error('`anchors` and `edits` must be lists of objects.');
   }
@@ -139,29 +151,38 @@ export function readConstraints(text: string): ConstraintsFile {
   if (!isTexture(texture)) {
     throw new Error(`\`texture\` must be one of ${TEXTURES.map(([name]) => name).join(', ')}.`);
   }
-  return { ...chosenHoles(holes), acceptDoubtful, constraints: { anchors, edits, alternative, texture } };
+  const isSelecting = (name: string): boolean => (SELECTING as readonly string[]).includes(name);
+  const entries = Object.entries(others);
+  const selecting = Object.fromEntries(entries.filter(([name]) => isSelecting(name)));
+  const more = Object.fromEntries(entries.filter(([name]) => !isSelecting(name)));
+  const { isOwn, ...chosen } = chosenHoles(holes);
+  const selection =
+    isOwn && Object.keys(selecting).length === 0 ? undefined : { ...(holes !== undefined && { holes }), ...selecting };
+  return { ...chosen, acceptDoubtful, selection, more, constraints: { anchors, edits, alternative, texture } };
 }
 
 /** What a file fills: where it chooses no holes those that are filled now, if any, otherwise all. */
 export function choiceOf(
-  { holes, made, acceptDoubtful }: ConstraintsFile,
+  { holes, made, acceptDoubtful, selection, more }: ConstraintsFile,
   step: Choice,
   loops: readonly Loop[],
 ): Choice {
   const all = loops.filter(isHole).map((loop) => loop.id ?? 0);
   const chosen = holes ?? (step.holes.length > 0 ? step.holes : all);
-  return { holes: [...chosen].sort((a, b) => a - b), made, acceptDoubtful };
+  return { holes: [...chosen].sort((a, b) => a - b), made, acceptDoubtful, selection, more };
 }
 
-function chosenHoles(holes: unknown): Pick<ConstraintsFile, 'holes' | 'made'> {
+/** The holes that a file names, and whether all are named in ways that the editor has itself. */
+function chosenHoles(holes: unknown): Pick<ConstraintsFile, 'holes' | 'made'> & { readonly isOwn: boolean } {
   if (holes === undefined) {
-    return { holes: undefined, made: [] };
+    return { holes: undefined, made: [], isOwn: true };
   }
   if (!isObjects(holes)) {
     throw new Error('`holes` must be a list of objects.');
   }
   const ids: number[] = [];
   const made: MadeHole[] = [];
+  let isOwn = true;
   for (const hole of holes as { id?: unknown; cut?: Cut; border?: Border | 'auto' }[]) {
     if (typeof hole.id === 'number' && Number.isInteger(hole.id)) {
       ids.push(hole.id);
@@ -172,10 +193,11 @@ function chosenHoles(holes: unknown): Pick<ConstraintsFile, 'holes' | 'made'> {
     } else if (typeof hole.border === 'object') {
       made.push({ border: hole.border });
     } else {
-      throw new Error('The editor reads holes by `id`, `cut` and `border`.');
+      // Such as `near`: the service says which hole that is.
+      isOwn = false;
     }
   }
-  return { holes: ids, made };
+  return { holes: ids, made, isOwn };
 }
 
 function isObjects(value: unknown): value is object[] {

@@ -173,13 +173,13 @@ export class Editor extends EventTarget {
     const holes = [...this.chosen].sort((a, b) => a - b);
     const count = `${holes.length} ${holes.length === 1 ? 'hole' : 'holes'}`;
     const { acceptDoubtful } = this;
-    await this.fill(`Mend ${count}`, { holes, made: this.step.made, acceptDoubtful });
+    await this.fill(`Mend ${count}`, { ...this.step, holes, acceptDoubtful, selection: undefined });
   }
 
   /** Mends a hole that an entry of `holes` makes, beside what is filled already. */
   async make(label: string, entry: MadeHole): Promise<void> {
     const { step } = this;
-    await this.fill(label, { ...step, made: [...step.made, entry] });
+    await this.fill(label, { ...step, made: [...step.made, entry], selection: undefined });
   }
 
   /** Takes back a made hole: cloth that was cut out is there again. */
@@ -192,7 +192,7 @@ export class Editor extends EventTarget {
       this.history.push({ ...START, label: 'Put back' });
       this.say('Put back: nothing is mended.');
     } else {
-      await this.fill('Put back', { ...step, holes, made });
+      await this.fill('Put back', { ...step, holes, made, selection: undefined });
     }
   }
 
@@ -420,7 +420,7 @@ export class Editor extends EventTarget {
   /** Fills holes under constraints. */
   private async apply(label: string, choice: Choice, constraints: ClothConstraints): Promise<void> {
     await this.working(label, async (progress) => {
-      if (choice.holes.length + choice.made.length > 0) {
+      if (choice.selection !== undefined || choice.holes.length + choice.made.length > 0) {
         await this.take(label, { choice, constraints }, progress);
         this.dispatchEvent(new Event('edited'));
       }
@@ -442,8 +442,9 @@ export class Editor extends EventTarget {
     const { skipped, cutFaces } = session;
     this.skipped = skipped;
     const holes = patches.map((patch) => patch.hole.id ?? 0);
-    const { made, acceptDoubtful } = choice;
-    this.history.push({ label, holes, made, acceptDoubtful, constraints, patches, cutFaces, report });
+    const { made, acceptDoubtful, selection, more } = choice;
+    const chosen = { holes, made, acceptDoubtful, selection, more };
+    this.history.push({ label, ...chosen, constraints, patches, cutFaces, report });
     this.message = stepInWords(this.history.present);
   }
 

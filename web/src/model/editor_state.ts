@@ -52,6 +52,8 @@ export const START: Step = {
   holes: [],
   made: [],
   acceptDoubtful: false,
+  selection: undefined,
+  more: {},
   constraints: NO_CONSTRAINTS,
   patches: [],
   cutFaces: [],

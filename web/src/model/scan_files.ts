@@ -45,6 +45,11 @@ export async function scanOf(files: readonly NamedFile[]): Promise<{ file: Blob;
   return { file: new Blob([JSON.stringify(gltf)], { type: 'model/gltf+json' }), name };
 }
 
+/** The name of a scan without its ending, for files that are made of it. */
+export function scanBaseName(name = 'scan'): string {
+  return name.replace(/\.(glb|gltf)$/i, '');
+}
+
 /**
  * The scan at an address.
  *

@@ -151,8 +151,8 @@ export class ScanSession {
 }
 
 /** A choice as a text to compare. */
-function keyOf({ holes, made, acceptDoubtful }: Choice): string {
-  return JSON.stringify([holes, made, acceptDoubtful]);
+function keyOf({ holes, made, acceptDoubtful, selection, more }: Choice): string {
+  return JSON.stringify([holes, made, acceptDoubtful, selection, more]);
 }
 
 function dressed(patches: readonly HolePositions[], dressing: Dressing): Patch[] {

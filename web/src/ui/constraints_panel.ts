@@ -1,10 +1,13 @@
-/** The constraints as JSON: to copy, to keep, to load. */
+/** The constraints as JSON: to copy, to keep as a file, to load. */
+import { scanBaseName } from '../model/scan_files.js';
 import { type TemplateResult, html } from '../vendor.js';
+import { download } from './download.js';
 import { Panel } from './panel.js';
 
 export class ConstraintsPanel extends Panel {
   protected override render(): TemplateResult {
     const { work } = this.editor;
+    const busy = work !== undefined;
     return html`
       <details>
         <summary>Constraints as JSON</summary>
@@ -20,7 +23,10 @@ export class ConstraintsPanel extends Panel {
         ></textarea>
         <div class="row">
           <button @click=${this.copy}>Copy</button>
-          <button ?disabled=${work !== undefined} @click=${this.load}>Load</button>
+          <button ?disabled=${busy} @click=${this.load}>Load</button>
+          <button @click=${this.save}>Save as a file</button>
+          <button ?disabled=${busy} @click=${this.pick}>Load a file</button>
+          <input type="file" accept=".json,application/json" hidden @change=${this.picked} />
         </div>
       </details>
     `;
@@ -43,6 +49,23 @@ export class ConstraintsPanel extends Panel {
   };
 
   private readonly load = (): void => void this.editor.loadConstraints(this.field?.value ?? '');
+
+  private readonly save = (): void => {
+    const file = new Blob([this.field?.value ?? '', '\n'], { type: 'application/json' });
+    download(file, `${scanBaseName(this.editor.scan?.name)}.constraints.json`);
+  };
+
+  private readonly pick = (): void => this.renderRoot.querySelector<HTMLInputElement>('input[type=file]')?.click();
+
+  private readonly picked = async (event: Event): Promise<void> => {
+    const input = event.target as HTMLInputElement;
+    const text = await input.files?.[0]?.text();
+    // So that the same file can be picked again.
+    input.value = '';
+    if (text !== undefined) {
+      await this.editor.loadConstraints(text);
+    }
+  };
 }
 
 customElements.define('darn-constraints', ConstraintsPanel);

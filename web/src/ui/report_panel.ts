@@ -1,5 +1,6 @@
 /** What was done, in words. */
 import { holeInWords, reportInWords } from '../model/report.js';
+import { scanBaseName } from '../model/scan_files.js';
 import { type TemplateResult, css, html, nothing } from '../vendor.js';
 import { download } from './download.js';
 import { Panel } from './panel.js';
@@ -34,15 +35,11 @@ export class ReportPanel extends Panel {
         (hole) => html`<div class="hole">${holeInWords(hole).map((line) => html`<p>${line}</p>`)}</div>`,
       )}
       <button
-        @click=${() => download(new Blob([JSON.stringify(report, undefined, 2)]), `${this.baseName}.report.json`)}
+        @click=${() => download(new Blob([JSON.stringify(report, undefined, 2)]), `${scanBaseName(this.editor.scan?.name)}.report.json`)}
       >
         Save the report
       </button>
     `;
-  }
-
-  private get baseName(): string {
-    return (this.editor.scan?.name ?? 'scan').replace(/\.(glb|gltf)$/i, '');
   }
 }
 
