@@ -393,6 +393,41 @@ inEditor(
     await editor.idle();
     assert.equal(JSON.parse(await editor.model((it) => it.constraintsText())).edits.length, 1);
     await editor.keep('narrow');
+
+    // Two fingers, the first of which is on new cloth and has pulled it: the camera comes nearer, and nothing else happens.
+    const distance = () =>
+      page.evaluate(() => {
+        const { viewer } = document.querySelector('darn-editor').shadowRoot.querySelector('darn-stage');
+        return viewer.camera.position.distanceTo(viewer.controls.target);
+      });
+    const constraints = await editor.model((it) => it.constraintsText());
+    for (const tool of ['Grab', 'Cut out']) {
+      await page.getByRole('button', { name: tool, exact: true }).tap();
+      const from = tool === 'Grab' ? await editor.onCloth() : await editor.onCloth(0.03, 0.17);
+      const before = await distance();
+      const fingers = (spread) => [
+        { x: from.x - 30 - spread, y: from.y, id: 0 },
+        { x: from.x + 40 + spread, y: from.y + 20, id: 1 },
+      ];
+      await touch('touchStart', [{ x: from.x, y: from.y, id: 0 }]);
+      // Far enough that the browser takes it for no tap.
+      await touch('touchMove', fingers(0).slice(0, 1));
+      await page.waitForFunction(() => document.querySelector('darn-editor').editor.draft !== undefined);
+      await touch('touchStart', fingers(0));
+      assert.equal(await editor.model((it) => it.draft), undefined, `${tool}: what was begun is taken back`);
+      for (let step = 1; step <= 5; step += 1) {
+        await touch('touchMove', fingers(6 * step));
+      }
+      await touch('touchEnd', []);
+      await editor.idle();
+      assert.ok((await distance()) < 0.8 * before, `${tool}: the camera comes nearer`);
+      assert.equal(await editor.model((it) => it.constraintsText()), constraints);
+      assert.equal(await editor.model((it) => it.draft), undefined);
+      await page.evaluate(() =>
+        document.querySelector('darn-editor').shadowRoot.querySelector('darn-stage').viewer.frame(),
+      );
+      await editor.idle();
+    }
   },
   { viewport: { width: 400, height: 800 }, hasTouch: true, isMobile: true },
 );

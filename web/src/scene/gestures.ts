@@ -44,6 +44,17 @@ interface Hold {
   /** Which handle of a stretch of border, or corner of a polygon, it holds. */
   readonly part?: number | undefined;
   moved: boolean;
+  /** The draft before it went down. */
+  readonly before: Draft | undefined;
+  /** Where it is now. */
+  last: PointerEvent;
+}
+
+/** A finger that has been down for a while goes down for the camera's controls. */
+class FirstFinger extends PointerEvent {
+  constructor(last: PointerEvent) {
+    super('pointerdown', last);
+  }
 }
 
 /** A place on cloth, and where it was when it was taken. */
@@ -105,8 +116,11 @@ export class Gestures {
 
   private down(event: PointerEvent): void {
     const { tool, work } = this.editor;
+    if (event instanceof FirstFinger) {
+      return;
+    }
     if (this.hold !== undefined) {
-      event.stopImmediatePropagation();
+      this.joined(this.hold, event);
       return;
     }
     if (tool === 'look' || work !== undefined || event.button !== 0 || !event.isPrimary) {
@@ -136,7 +150,24 @@ export class Gestures {
     event.stopImmediatePropagation();
     this.viewer.canvas.focus();
     this.viewer.canvas.setPointerCapture(event.pointerId);
-    this.hold = { pointer: event.pointerId, x: event.clientX, y: event.clientY, hit, cloth, part, moved: false };
+    const { pointerId: pointer, clientX: x, clientY: y } = event;
+    this.hold = { pointer, x, y, hit, cloth, part, moved: false, before: this.editor.draft, last: event };
+  }
+
+  /** Another pointer comes down. Two fingers move the camera: what the first one began is taken back, and the camera's controls get both. */
+  private joined(hold: Hold, event: PointerEvent): void {
+    if (event.pointerType !== 'touch' || hold.last.pointerType !== 'touch') {
+      event.stopImmediatePropagation();
+      return;
+    }
+    this.hold = undefined;
+    if (hold.before === undefined) {
+      this.editor.dropDraft();
+    } else {
+      this.editor.preview(hold.before);
+    }
+    // The controls have not heard of the first finger.
+    this.viewer.canvas.dispatchEvent(new FirstFinger(hold.last));
   }
 
   /** Takes the nearest of some points that a draft has; false where none is near to the pointer. */
@@ -245,6 +276,7 @@ export class Gestures {
       return;
     }
     event.stopImmediatePropagation();
+    hold.last = event;
     hold.moved ||= Math.hypot(event.clientX - hold.x, event.clientY - hold.y) > CLICK;
     const draft = hold.moved ? this.dragged(hold, event) : undefined;
     if (draft !== undefined) {
