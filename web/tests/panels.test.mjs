@@ -78,3 +78,63 @@ inEditor(
     assert.deepEqual([holes, weights, minDiameter], [[{ id: ids[2] }], 'standard', undefined]);
   },
 );
+
+/** A GLB as the text of its JSON and the chunks behind it. */
+function chunksOf(glb) {
+  assert.equal(glb.readUInt32LE(8), glb.length);
+  const end = 20 + glb.readUInt32LE(12);
+  return { json: JSON.parse(glb.subarray(20, end)), rest: glb.subarray(end) };
+}
+
+inEditor('the new cloth of a saved scan is marked or blended, and a picture is saved', async (editor, page) => {
+  await editor.openExample();
+  await editor.mend();
+  const blended = chunksOf((await saved(editor, page)).bytes);
+  await page.getByRole('radio', { name: 'Marked by glowing stripes' }).check();
+  await page.getByText(/“Reconstruction blended” and “Reconstruction marked”/).waitFor();
+  const file = (await saved(editor, page)).bytes;
+  const marked = chunksOf(file);
+  assert.ok(marked.rest.equals(blended.rest));
+  const variants = marked.json.extensions.KHR_materials_variants.variants.map(({ name }) => name);
+  const primitives = ({ json }) => json.meshes.flatMap((mesh) => mesh.primitives);
+  const changed = primitives(blended).filter((it, at) => it.material !== primitives(marked)[at].material);
+  assert.equal(changed.length, 1);
+  for (const [at, primitive] of primitives(marked).entries()) {
+    const mappings = primitive.extensions?.KHR_materials_variants?.mappings ?? [];
+    const look = mappings.find((it) => it.variants.includes(variants.indexOf('Reconstruction marked')));
+    assert.equal(primitive.material, look?.material ?? primitives(blended)[at].material);
+    primitive.material = primitives(blended)[at].material;
+  }
+  assert.deepEqual(marked.json, blended.json, 'nothing else has changed');
+
+  const [download] = await Promise.all([page.waitForEvent('download'), editor.button('Save a picture').click()]);
+  assert.equal(download.suggestedFilename(), 'scarf_hole.png');
+  const png = readFileSync(await download.path()).toString('base64');
+  const { share, width } = await page.evaluate(async (base64) => {
+    const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+    const image = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
+    const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
+    context.drawImage(image, 0, 0);
+    const { data } = context.getImageData(0, 0, image.width, image.height);
+    return {
+      width: image.width,
+      share: data.filter((value, at) => at % 4 === 3 && value > 0).length / (data.length / 4),
+    };
+  }, png);
+  const stage = await page.locator('darn-stage').boundingBox();
+  assert.equal(width, stage.width);
+  assert.ok(share > 0.1 && share < 0.95, `${share} of the picture is drawn, the rest is transparent`);
+
+  // The file that was saved shows its stripes without a choice.
+  const before = await editor.picture();
+  await drop(page, 'marked.glb', file);
+  await page
+    .getByRole('status')
+    .getByText(/marked\.glb is open/)
+    .waitFor();
+  await editor.idle();
+  await page.getByRole('checkbox', { name: /Outlines/ }).uncheck();
+  await editor.idle();
+  await editor.keep('saved-marked');
+  assert.ok((await editor.difference(before, await editor.picture())) > 0.01);
+});

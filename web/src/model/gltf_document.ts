@@ -32,10 +32,21 @@ export interface GltfDocument {
   }[];
 }
 
+/** Bytes of a GLB before its JSON. */
+export const GLB_HEADER = 20;
+
+export function isGlb(bytes: ArrayBuffer): boolean {
+  return bytes.byteLength >= GLB_HEADER && new TextDecoder().decode(bytes.slice(0, 4)) === 'glTF';
+}
+
+/** The JSON of a GLB as bytes. */
+export function jsonOfGlb(bytes: ArrayBuffer): ArrayBuffer {
+  return bytes.slice(GLB_HEADER, GLB_HEADER + new DataView(bytes).getUint32(12, true));
+}
+
 /** The JSON of a GLB or a glTF; empty where the bytes are neither, which the service has an error for. */
 export function documentOf(bytes: ArrayBuffer): GltfDocument {
-  const isGlb = bytes.byteLength >= 20 && new TextDecoder().decode(bytes.slice(0, 4)) === 'glTF';
-  const json = isGlb ? bytes.slice(20, 20 + new DataView(bytes).getUint32(12, true)) : bytes;
+  const json = isGlb(bytes) ? jsonOfGlb(bytes) : bytes;
   try {
     return JSON.parse(new TextDecoder().decode(json)) as GltfDocument;
   } catch {

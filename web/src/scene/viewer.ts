@@ -343,6 +343,17 @@ export class Viewer {
     }
   }
 
+  /** What is drawn as a PNG, its background transparent. */
+  async picture(): Promise<Blob> {
+    this.drawNow();
+    // At once: after this task the browser may have cleared what was drawn.
+    const picture = await new Promise<Blob | null>((resolve) => this.canvas.toBlob(resolve, 'image/png'));
+    if (picture === null) {
+      throw new Error('The browser made no picture.');
+    }
+    return picture;
+  }
+
   dispose(): void {
     cancelAnimationFrame(this.frameAsked);
     this.clear();

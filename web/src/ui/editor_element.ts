@@ -12,7 +12,8 @@
  */
 import { withoutLastCorner } from '../model/draft.js';
 import { Editor } from '../model/editor.js';
-import { scanOf } from '../model/scan_files.js';
+import { type SavedLook, withLook } from '../model/saved_look.js';
+import { scanBaseName, scanOf } from '../model/scan_files.js';
 import { Service } from '../client.js';
 import { FIRST_LOOK, type Look } from '../scene/viewer.js';
 import { type TemplateResult, LitElement, css, html, nothing } from '../vendor.js';
@@ -23,6 +24,7 @@ import './holes_panel.js';
 import { type KeyDialog, TabKeys } from './key_dialog.js';
 import './look_panel.js';
 import './report_panel.js';
+import './save_panel.js';
 import { Stage } from './stage.js';
 import { shared } from './styles.js';
 import { TOOLS, needsCloth } from './tools_panel.js';
@@ -139,6 +141,7 @@ export class EditorElement extends LitElement {
   private dragging = false;
   /** The look that was chosen. */
   private shown = FIRST_LOOK;
+  private savedLook: SavedLook = 'blended';
   private made: Editor | undefined;
 
   constructor() {
@@ -256,7 +259,12 @@ export class EditorElement extends LitElement {
         <darn-stage .editor=${editor}></darn-stage>
         ${scan === undefined && work === undefined ? this.welcome() : nothing} ${this.notices()}
       </main>
-      <aside @darn-frame=${this.frame} @darn-look=${this.look}>
+      <aside
+        @darn-frame=${this.frame}
+        @darn-look=${this.look}
+        @darn-saved-look=${this.chooseSavedLook}
+        @darn-picture=${this.savePicture}
+      >
         ${
           scan === undefined
             ? html`<p class="quiet">The holes of the scan will be listed here.</p>`
@@ -265,6 +273,7 @@ export class EditorElement extends LitElement {
                 <darn-tools .editor=${editor}></darn-tools>
                 <darn-chart .editor=${editor}></darn-chart>
                 <darn-look .editor=${editor} .shown=${this.shown}></darn-look>
+                <darn-save .editor=${editor} .look=${this.savedLook}></darn-save>
                 <darn-report .editor=${editor}></darn-report>
                 <darn-constraints .editor=${editor}></darn-constraints>
               `
@@ -354,11 +363,25 @@ export class EditorElement extends LitElement {
   private readonly save = async (): Promise<void> => {
     const result = await this.editor.result();
     if (result !== undefined) {
+      const file = await withLook(result, this.savedLook);
       const opened = this.editor.scan?.name ?? 'scan.glb';
       const name = opened.replace(/(\.[a-z]+)?$/i, (ending) => `.mended${ending || '.glb'}`);
-      if (this.emit('saved', { file: result, name })) {
-        download(result, name);
+      if (this.emit('saved', { file, name })) {
+        download(file, name);
       }
+    }
+  };
+
+  private readonly chooseSavedLook = ({ detail }: CustomEvent<SavedLook>): void => {
+    this.savedLook = detail;
+    this.requestUpdate();
+  };
+
+  private readonly savePicture = async (): Promise<void> => {
+    const picture = await this.stage?.viewer?.picture();
+    if (picture !== undefined) {
+      download(picture, `${scanBaseName(this.editor.scan?.name)}.png`);
+      this.editor.say('The picture is saved.');
     }
   };
 

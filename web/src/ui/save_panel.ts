@@ -1,0 +1,67 @@
+/** What is saved, and how: the look of the new cloth in the file, and a picture. */
+import { SAVED_LOOKS, type SavedLook } from '../model/saved_look.js';
+import { type TemplateResult, css, html, nothing } from '../vendor.js';
+import { Panel } from './panel.js';
+
+/** The event `darn-saved-look` carries the look that was chosen in `detail`; `darn-picture` asks for the picture as a file. */
+export class SavePanel extends Panel {
+  static override styles = [
+    Panel.styles,
+    css`
+      fieldset {
+        margin: 0 0 0.5rem;
+        padding: 0;
+        border: 0;
+      }
+      label {
+        display: flex;
+        align-items: center;
+        gap: 4px;
+        min-height: 28px;
+      }
+    `,
+  ].flat();
+
+  static override properties = { look: {} };
+
+  /** How the new cloth of a saved scan looks. */
+  declare look: SavedLook;
+
+  protected override render(): TemplateResult {
+    return html`
+      <h2>Save</h2>
+      ${this.editor.step.holes.length > 0 ? this.looks() : nothing}
+      <button @click=${() => this.tell('darn-picture')}>Save a picture</button>
+    `;
+  }
+
+  private looks(): TemplateResult {
+    return html`
+      <fieldset>
+        <legend class="quiet small">New cloth in the saved scan</legend>
+        ${SAVED_LOOKS.map(
+          ([look, , name]) => html`
+            <label>
+              <input
+                type="radio"
+                name="saved-look"
+                .checked=${this.look === look}
+                @change=${() => this.tell('darn-saved-look', look)}
+              />${name}
+            </label>
+          `,
+        )}
+        <p class="quiet small">
+          The file has both: viewers that let you choose a variant call them
+          ${SAVED_LOOKS.map(([, variant], at) => html`${at > 0 ? ' and ' : ''}“${variant}”`)}.
+        </p>
+      </fieldset>
+    `;
+  }
+
+  private tell(name: string, detail?: SavedLook): void {
+    this.dispatchEvent(new CustomEvent(name, { detail, bubbles: true, composed: true }));
+  }
+}
+
+customElements.define('darn-save', SavePanel);
