@@ -138,3 +138,45 @@ inEditor('the new cloth of a saved scan is marked or blended, and a picture is s
   await editor.keep('saved-marked');
   assert.ok((await editor.difference(before, await editor.picture())) > 0.01);
 });
+
+/** What is marked in the scene: of the ring its radius, and whether there is a disk. */
+function twistMarks() {
+  const { marks } = document.querySelector('darn-editor').shadowRoot.querySelector('darn-stage').viewer;
+  const ring = marks.group.children.find((it) => it.type === 'LineLoop');
+  const disk = marks.group.children.find((it) => it.name === 'twist');
+  ring?.geometry.computeBoundingSphere();
+  return { radius: ring?.geometry.boundingSphere.radius ?? 0, hasDisk: disk !== undefined };
+}
+
+inEditor(
+  'the disk of a twist is seen under the pointer, before and while the wheel changes it',
+  async (editor, page) => {
+    await editor.openExample();
+    await editor.mend();
+    const middle = await editor.onCloth();
+    await page.mouse.move(middle.x + 1, middle.y);
+    await editor.idle();
+    assert.deepEqual(await page.evaluate(twistMarks), { radius: 0, hasDisk: false }, 'only for the twist');
+    const plain = await editor.picture();
+    await editor.tool('t');
+    await page.mouse.move(middle.x, middle.y);
+    await editor.idle();
+    const hovered = await page.evaluate(twistMarks);
+    assert.ok(hovered.radius > 0 && hovered.hasDisk);
+    assert.ok((await editor.difference(plain, await editor.picture())) > 0.005, 'the disk is seen');
+    await editor.keep('twist-disk');
+    await page.mouse.wheel(0, -100);
+    await editor.idle();
+    const wider = await page.evaluate(twistMarks);
+    assert.ok(Math.abs(wider.radius / hovered.radius - 1.1) < 1e-3, 'the wheel changes it before a drag');
+    await page.mouse.down();
+    await editor.idle();
+    assert.deepEqual(await page.evaluate(twistMarks), wider, 'a press keeps it');
+    assert.equal(await editor.model((it) => it.draft), undefined);
+    await page.mouse.up();
+    const aside = await page.locator('aside').boundingBox();
+    await page.mouse.move(aside.x + 20, aside.y + 20);
+    await editor.idle();
+    assert.equal((await page.evaluate(twistMarks)).radius, 0, 'away from the cloth there is none');
+  },
+);

@@ -10,38 +10,54 @@ import { type Marked, circle } from './marks.js';
 /** Cells of a grid's side. */
 const GRID = 64;
 
+/** A disk of new cloth. */
+export interface Disk {
+  readonly point: ClothPoint;
+  /** On the chart. */
+  readonly radius: number;
+}
+
 /** What marks need of the picture. */
 export interface Waiting {
   /** The first point of a pinch. */
   readonly cloth: ClothPoint | undefined;
   /** The first end of a stretch of border. */
   readonly border: Vector3 | undefined;
+  /** The disk that a twist would turn. */
+  readonly disk: Disk | undefined;
   /** The way along the cloth's own edge. */
   stretch(edge: EdgeEnds, facing?: EdgeEnds): Vector3[];
 }
 
 /**
- * The handle where the hand is, the tether from there to where the cloth is now, the ring of a twist.
+ * The handle where the hand is, the tether from there to where the cloth is now, the disk of a twist and the ring around it.
  */
 export function marksOf(editor: Editor, gesture: Waiting): Marked {
   const { draft } = editor;
-  const { cloth: waiting, border } = gesture;
+  const { cloth: waiting, border, disk } = gesture;
   if (draft !== undefined && isMaking(draft)) {
     return makingMarks(draft, gesture);
   }
   if (border !== undefined) {
     return { handles: [border] };
   }
-  const hole = draft?.hole ?? waiting?.hole;
+  const hole = draft?.hole ?? waiting?.hole ?? disk?.point.hole;
   const before = editor.step.patches.find((patch) => patch.hole.id === hole);
   const now = editor.patches.find((patch) => patch.hole.id === hole);
   if (before === undefined || now === undefined) {
     return {};
   }
+  const spacing = editor.reportOf(now.hole.id ?? 0)?.grid?.spacingMean ?? 0;
   if (draft === undefined) {
-    return waiting ? { handles: [at(now, waiting)] } : {};
+    return waiting ? { handles: [at(now, waiting)] } : disk ? diskMarks(disk, now, spacing) : {};
   }
-  return draftMarks(draft, before, now, editor.reportOf(draft.hole)?.grid?.spacingMean ?? 0);
+  return draftMarks(draft, before, now, spacing);
+}
+
+function diskMarks({ point, radius }: Disk, now: Patch, spacing: number): Marked {
+  const center = at(now, point);
+  const ring = circle(center, new Vector3(...normalOf(now, point)), radius * GRID * spacing);
+  return { handles: [center], ring, disk: { center, ring } };
 }
 
 function makingMarks(draft: MakingDraft, { stretch }: Waiting): Marked {
@@ -73,12 +89,7 @@ function draftMarks(draft: ClothDraft, before: Patch, now: Patch, spacing: numbe
     }
     case 'twist': {
       const point = locate(now, draft.uv);
-      if (point === undefined) {
-        return {};
-      }
-      const center = at(now, point);
-      const ring = circle(center, new Vector3(...normalOf(now, point)), draft.radius * GRID * spacing);
-      return { handles: [center], ring };
+      return point ? diskMarks({ point, radius: draft.radius }, now, spacing) : {};
     }
     case 'pinch': {
       const ends = draft.uvs.map((uv: Uv) => locate(now, uv)).filter((point) => point !== undefined);

@@ -13,6 +13,7 @@ import {
 } from '../model/draft.js';
 import type { Editor } from '../model/editor.js';
 import { Vector3 } from '../vendor.js';
+import type { Disk } from './draft_marks.js';
 import type { Hit, Viewer } from './viewer.js';
 
 /** A pointer that moved less, in CSS pixels, has clicked. */
@@ -74,6 +75,10 @@ export class Gestures {
   private heldAxis: string | undefined;
   private radius = 0.125;
   private firstOfBorder: Vector3 | undefined;
+  /** The new cloth under a pointer that is not down, while a twist is chosen. */
+  private hovered: ClothPoint | undefined;
+  /** Told when what is marked has changed without the editor's knowing. */
+  onMarks: () => void = () => {};
   private readonly listening = new AbortController();
 
   constructor(
@@ -87,6 +92,7 @@ export class Gestures {
     canvas.addEventListener('pointermove', (event) => this.move(event), first);
     canvas.addEventListener('pointerup', (event) => this.up(event), first);
     canvas.addEventListener('pointercancel', () => this.cancel(), first);
+    canvas.addEventListener('pointerleave', () => this.hover(undefined), { signal });
     canvas.addEventListener('wheel', (event) => this.wheel(event), { ...first, passive: false });
     addEventListener('keydown', (event) => this.key(event, true), { signal });
     addEventListener('keyup', (event) => this.key(event, false), { signal });
@@ -100,6 +106,13 @@ export class Gestures {
   /** The first end of a stretch of border that waits for its second. */
   get waitingEnd(): Vector3 | undefined {
     return this.editor.tool === 'border' ? this.firstOfBorder : undefined;
+  }
+
+  /** The disk that a twist would turn: where the pointer is, before it is dragged. */
+  get disk(): Disk | undefined {
+    const { tool, work } = this.editor;
+    const point = this.hold === undefined ? this.hovered : this.hold.cloth?.point;
+    return tool === 'twist' && work === undefined && point ? { point, radius: this.radius } : undefined;
   }
 
   /** Forgets the gesture that is being made. */
@@ -144,6 +157,15 @@ export class Gestures {
       return;
     }
     this.take(event, { hit, cloth });
+    this.onMarks();
+  }
+
+  /** Remembers which new cloth is under the pointer. */
+  private hover(point: ClothPoint | undefined): void {
+    if (point !== this.hovered) {
+      this.hovered = point;
+      this.onMarks();
+    }
   }
 
   private take(event: PointerEvent, { hit, cloth, part }: Pick<Hold, 'hit' | 'cloth' | 'part'>): void {
@@ -272,6 +294,10 @@ export class Gestures {
 
   private move(event: PointerEvent): void {
     const { hold } = this;
+    if (hold === undefined && event.buttons === 0) {
+      const isTwist = this.editor.tool === 'twist';
+      this.hover(isTwist ? this.viewer.pick(event.clientX, event.clientY)?.cloth : undefined);
+    }
     if (hold === undefined || event.pointerId !== hold.pointer) {
       return;
     }
@@ -291,6 +317,8 @@ export class Gestures {
     }
     event.stopImmediatePropagation();
     this.hold = undefined;
+    // A finger that is lifted is nowhere.
+    this.hover(event.pointerType === 'touch' ? undefined : hold.cloth?.point);
     const { tool } = this.editor;
     if (tool === 'pinch') {
       this.pinched(hold);
@@ -390,9 +418,11 @@ export class Gestures {
       }
       return;
     }
-    if (this.editor.tool !== 'twist' || this.viewer.pick(event.clientX, event.clientY)?.cloth === undefined) {
+    const cloth = this.editor.tool === 'twist' ? this.viewer.pick(event.clientX, event.clientY)?.cloth : undefined;
+    if (cloth === undefined) {
       return;
     }
+    this.hovered = cloth;
     event.preventDefault();
     event.stopImmediatePropagation();
     const radius = this.radius * RADIUS.step ** -Math.sign(event.deltaY);

@@ -1,4 +1,4 @@
-/** Marks of a gesture: the handle under the pointer, the tether to the cloth, the ring of a twist, the ball or polygon of a cut, the stretch of a border. */
+/** Marks of a gesture: the handle under the pointer, the tether to the cloth, the disk of a twist, the ball or polygon of a cut, the stretch of a border. */
 import {
   BufferAttribute,
   BufferGeometry,
@@ -27,6 +27,8 @@ const HAND = 0x0b7285;
 const CUT = 0xc2255c;
 /** The name of the ball of a cut, whose size is the scene's. */
 const BALL = 'cut';
+/** The name of the disk of a twist. */
+const DISK = 'twist';
 
 /** What is marked. */
 export interface Marked {
@@ -36,6 +38,8 @@ export interface Marked {
   readonly tethers?: readonly (readonly [Vector3, Vector3])[];
   /** A closed line. */
   readonly ring?: readonly Vector3[];
+  /** A see-through surface from a point to a closed line around it. */
+  readonly disk?: { readonly center: Vector3; readonly ring: readonly Vector3[] };
   /** A ball that shows where it goes through the cloth. */
   readonly ball?: { readonly center: Vector3; readonly radius: number };
   /** Broad lines. */
@@ -56,16 +60,28 @@ export class Marks {
     depthWrite: false,
     side: DoubleSide,
   });
+  private readonly diskMaterial = new MeshBasicMaterial({
+    color: HAND,
+    transparent: true,
+    opacity: 0.3,
+    depthTest: false,
+    side: DoubleSide,
+  });
   private readonly lineMaterial = new LineBasicMaterial({ color: HAND, depthTest: false, transparent: true });
 
   /** Shows these marks in place of those before. */
-  show({ handles = [], tethers = [], ring = [], ball, stretches = [], dashes = [] }: Marked): void {
+  show({ handles = [], tethers = [], ring = [], disk, ball, stretches = [], dashes = [] }: Marked): void {
     this.clear();
     if (ball !== undefined) {
       const mark = new Mesh(this.ball, this.cutMaterial);
       mark.position.copy(ball.center);
       mark.scale.setScalar(ball.radius);
       mark.name = BALL;
+      this.group.add(mark);
+    }
+    if (disk !== undefined) {
+      const mark = new Mesh(fan(disk.center, disk.ring), this.diskMaterial);
+      mark.name = DISK;
       this.group.add(mark);
     }
     for (const stretch of stretches.filter((line) => line.length > 1)) {
@@ -95,8 +111,8 @@ export class Marks {
       if (mark instanceof Line2) {
         mark.geometry.dispose();
         mark.material.dispose();
-      } else if (mark instanceof Line) {
-        (mark.geometry as BufferGeometry).dispose();
+      } else if (mark instanceof Line || mark.name === DISK) {
+        (mark as Mesh<BufferGeometry>).geometry.dispose();
       }
     }
     this.group.clear();
@@ -123,6 +139,12 @@ export function circle(center: Vector3, normal: Vector3, radius: number): Vector
     const point = center.clone().addScaledVector(first, radius * Math.cos(angle));
     return point.addScaledVector(second, radius * Math.sin(angle));
   });
+}
+
+/** Triangles from a point to a closed line. */
+function fan(center: Vector3, ring: readonly Vector3[]): BufferGeometry {
+  const corners = ring.flatMap((point, at) => [center, point, ring[(at + 1) % ring.length] ?? point]);
+  return lineGeometry(corners);
 }
 
 function broadLine(points: readonly Vector3[], look: ConstructorParameters<typeof LineMaterial>[0]): Line2 {

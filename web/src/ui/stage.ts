@@ -65,6 +65,7 @@ export class Stage extends Panel {
     try {
       this.viewer = new Viewer(host);
       this.gestures = new Gestures(this.viewer, this.editor);
+      this.gestures.onMarks = () => this.requestUpdate();
     } catch (error) {
       this.editor.report(new Error(`This browser draws no 3-D pictures (WebGL 2): ${String(error)}`));
       return;
@@ -97,6 +98,7 @@ export class Stage extends Panel {
       marksOf(this.editor, {
         cloth: this.gestures?.waitingPoint,
         border: this.gestures?.waitingEnd,
+        disk: this.gestures?.disk,
         stretch: (edge, facing) => this.viewer?.stretchBetween(edge, facing) ?? [],
       }),
     );
