@@ -180,3 +180,48 @@ inEditor(
     assert.equal((await page.evaluate(twistMarks)).radius, 0, 'away from the cloth there is none');
   },
 );
+
+/** Where the camera is and what it turns about. */
+function cameraNow() {
+  const { camera, controls } = document.querySelector('darn-editor').shadowRoot.querySelector('darn-stage').viewer;
+  const distance = camera.position.distanceTo(controls.target);
+  return { position: [...camera.position], target: [...controls.target], distance };
+}
+
+inEditor('the camera turns, moves and zooms by keys on the picture, whatever the tool', async (editor, page) => {
+  await editor.openExample();
+  await editor.mend();
+  await editor.tool('g');
+  const start = await page.evaluate(cameraNow);
+  const after = async (...keys) => {
+    for (const key of keys) {
+      await page.keyboard.press(key);
+    }
+    return page.evaluate(cameraNow);
+  };
+  const apart = (a, b) => Math.hypot(...a.map((value, axis) => value - b[axis]));
+
+  const still = await editor.picture();
+  const turned = await after('ArrowLeft', 'ArrowUp');
+  await editor.idle();
+  assert.ok((await editor.difference(still, await editor.picture())) > 0.01, 'the picture follows');
+  assert.deepEqual(turned.target, start.target);
+  assert.ok(apart(turned.position, start.position) > 0.05 * start.distance);
+  assert.ok(Math.abs(turned.distance / start.distance - 1) < 1e-9);
+  const back = await after('ArrowRight', 'ArrowDown');
+  assert.ok(apart(back.position, start.position) < 1e-6 * start.distance, 'the other arrows turn it back');
+
+  const moved = await after('Shift+ArrowRight', 'Shift+ArrowDown');
+  assert.ok(apart(moved.target, back.target) > 0.01 * start.distance);
+  assert.ok(Math.abs(moved.distance / start.distance - 1) < 1e-9);
+  const near = await after('+', '+');
+  assert.ok(Math.abs(near.distance / start.distance - 0.81) < 1e-6);
+  assert.ok(Math.abs((await after('-', '-')).distance / start.distance - 1) < 1e-6);
+  assert.equal(await editor.model((it) => it.tool), 'grab');
+  assert.equal(await editor.model((it) => it.draft), undefined);
+
+  // In a field the keys belong to the field.
+  await page.getByLabel('Move y').focus();
+  const before = await page.evaluate(cameraNow);
+  assert.deepEqual(await after('ArrowUp', '-'), before);
+});

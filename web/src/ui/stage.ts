@@ -1,4 +1,5 @@
 /** The picture of the scan as an element: it shows the editor's state, and gives pointers and keys to the gestures. */
+import { moveByKey } from '../scene/camera_keys.js';
 import { marksOf } from '../scene/draft_marks.js';
 import { Gestures } from '../scene/gestures.js';
 import type { Heat, HeatScale } from '../scene/heat_colors.js';
@@ -80,8 +81,13 @@ export class Stage extends Panel {
     canvas.setAttribute('role', 'img');
     canvas.setAttribute(
       'aria-label',
-      'The scan. Drag to turn it, two fingers or the right button to move it, F to see all.',
+      'The scan. Drag or arrow keys to turn it; two fingers, the right button or Shift and arrow keys to move it; the wheel, plus or minus to zoom; F to see all.',
     );
+    canvas.addEventListener('keydown', (event) => {
+      if (this.viewer !== undefined && moveByKey(this.viewer.controls, event)) {
+        event.preventDefault();
+      }
+    });
     canvas.addEventListener('dblclick', (event) => {
       const hit = this.viewer?.pick(event.clientX, event.clientY);
       if (hit !== undefined) {

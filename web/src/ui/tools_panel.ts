@@ -38,7 +38,7 @@ export const TOOLS: readonly { tool: Tool; name: string; key: string; help: stri
     tool: 'look',
     name: 'Look',
     key: 'L',
-    help: 'Drag to turn the scan, right button or two fingers to move it, wheel to zoom.',
+    help: 'Drag to turn the scan, right button or two fingers to move it, wheel to zoom. With the picture in focus, the arrow keys turn it, with Shift they move it, + and - zoom.',
   },
   {
     tool: 'grab',
