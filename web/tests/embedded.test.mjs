@@ -99,13 +99,13 @@ test('the example with plain three.js mends and pulls', { timeout: 3 * PATIENCE 
   await page.locator('#scan').setInputFiles(EXAMPLE);
   await page.getByText('1 filled').waitFor();
   const picture = () => page.locator('canvas').screenshot();
-  const before = await picture();
+  const first = await picture();
   const answers = [];
   page.on('response', (response) => response.url().includes('/inpaint') && answers.push(response.status()));
   for (const value of ['0.2', '0.5', '0.9']) {
     await page.locator('#pull').fill(value);
   }
-  while (answers.length === 0 || before.equals(await picture())) {
+  while (answers.length === 0 || first.equals(await picture())) {
     await page.waitForTimeout(50);
   }
   assert.ok(answers.every((status) => status === 200));

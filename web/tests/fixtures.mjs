@@ -25,10 +25,10 @@ export function sheetGlb(side, missing) {
   }
   const indices = Uint32Array.from(corners);
   const max = [0, 1, 2].map((axis) =>
-    positions.reduce((most, value, at) => (at % 3 === axis ? Math.max(most, value) : most), -1),
+    positions.reduce((most, value, index) => (index % 3 === axis ? Math.max(most, value) : most), -1),
   );
   const min = [0, 1, 2].map((axis) =>
-    positions.reduce((least, value, at) => (at % 3 === axis ? Math.min(least, value) : least), 9),
+    positions.reduce((least, value, index) => (index % 3 === axis ? Math.min(least, value) : least), 9),
   );
   const json = {
     asset: { version: '2.0' },

@@ -4,6 +4,7 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
+import axe from 'axe-core';
 import { PATIENCE, openEditor, repository, startBrowser, startService } from './browser.mjs';
 
 export const EXAMPLE = readFileSync(join(repository, 'examples/scarf_hole.glb'));
@@ -29,6 +30,19 @@ export function editorTests() {
     });
 }
 
+/** The constraints of the present step. */
+export async function constraintsOf(editor) {
+  return JSON.parse(await editor.model((it) => it.constraintsText()));
+}
+
+/** Axe's complaints. */
+export async function complaints(page) {
+  // Evaluated by the debugger, which the content security policy does not concern.
+  await page.evaluate(axe.source);
+  const { violations } = await page.evaluate('axe.run()');
+  return violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ html }) => html).join(' ')}`);
+}
+
 /** What one `POST /inpaint` of the same constraints answers. */
 export async function stateless(service, constraints, scan = EXAMPLE) {
   const form = new FormData();
@@ -49,12 +63,12 @@ export async function saved(editor, page) {
 export async function drop(page, name, bytes, others = []) {
   const transfer = await page.evaluateHandle(
     (files) => {
-      const transfer = new DataTransfer();
+      const dropped = new DataTransfer();
       for (const [fileName, base64] of files) {
-        const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
-        transfer.items.add(new File([bytes], fileName));
+        const content = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+        dropped.items.add(new File([content], fileName));
       }
-      return transfer;
+      return dropped;
     },
     [[name, bytes], ...others].map(([fileName, content]) => [fileName, content.toString('base64')]),
   );

@@ -93,7 +93,9 @@ function middleOf(uvs: readonly number[]): { vertex: number; uv: [number, number
   return point && { vertex, uv: [point[0], point[1]] };
 }
 
-file.addEventListener('change', async () => {
+file.addEventListener('change', () => void mendChosen());
+
+async function mendChosen(): Promise<void> {
   const scan = file.files?.[0];
   if (scan === undefined) {
     return;
@@ -114,7 +116,7 @@ file.addEventListener('change', async () => {
   } catch (error) {
     said.value = describeError(error);
   }
-});
+}
 
 pull.addEventListener('input', () => {
   session?.drag(grab(), { onPatches: show, onError: (error) => (said.value = describeError(error)) });

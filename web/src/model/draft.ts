@@ -151,8 +151,8 @@ export function firstMaking(kind: MakingDraft['kind'], { loops, candidates }: Ma
     case 'polygon':
       return { kind, corners: [] };
     case 'border': {
-      const [first] = candidates;
-      return first ? bordering(first) : { kind, from: centroid, to: centroid, along: [] };
+      const [found] = candidates;
+      return found ? bordering(found) : { kind, from: centroid, to: centroid, along: [] };
     }
   }
 }

@@ -5,7 +5,7 @@ import type { PlainColour } from '../model/gltf_document.js';
 import type { Patch } from '../model/scan_session.js';
 import {
   BufferAttribute,
-  BufferGeometry,
+  type BufferGeometry,
   Color,
   DoubleSide,
   GLTFLoader,
@@ -250,11 +250,10 @@ function vertexNormals(positions: Float32Array, faces: readonly number[]): Float
       normals[3 * vertex + 2] = (normals[3 * vertex + 2] as number) + x1 * y2 - y1 * x2;
     }
   }
-  for (let at = 0; at < normals.length; at += 3) {
-    const length = Math.hypot(...normals.subarray(at, at + 3)) || 1;
-    for (let axis = 0; axis < 3; axis += 1) {
-      normals[at + axis] = (normals[at + axis] as number) / length;
-    }
+  for (let start = 0; start < normals.length; start += 3) {
+    const normal = normals.subarray(start, start + 3);
+    const length = Math.hypot(...normal) || 1;
+    normal.forEach((value, axis) => (normal[axis] = value / length));
   }
   return normals;
 }

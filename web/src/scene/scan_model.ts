@@ -4,7 +4,7 @@ import {
   BufferAttribute,
   type BufferGeometry,
   DoubleSide,
-  Group,
+  type Group,
   type Intersection,
   type Material,
   type Matrix4,

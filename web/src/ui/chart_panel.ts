@@ -86,8 +86,8 @@ export class ChartPanel extends Panel {
             ? svg`<polyline points=${path.map((uv) => at(uv).join()).join(' ')} fill="none" stroke="#0b7285" stroke-width="2" />`
             : nothing
         }
-        ${this.gestures(hole).map((uv) => dot(uv, '#ffffff'))}
-        ${draft ? placesOf(draft).map((uv) => dot(uv, '#22b8cf')) : nothing}
+        ${this.gestures(hole).map((uv) => place(uv, '#ffffff'))}
+        ${draft ? placesOf(draft).map((uv) => place(uv, '#22b8cf')) : nothing}
         ${search?.uv ? cross(search.uv as Uv) : nothing} ${dots.map((it) => this.anchorDot(it, patch))}
       </svg>
       ${
@@ -264,7 +264,7 @@ function at([u, v]: Uv): [number, number] {
   return [u * SIDE, (1 - v) * SIDE];
 }
 
-function dot(uv: Uv, color: string): TemplateResult {
+function place(uv: Uv, color: string): TemplateResult {
   const [x, y] = at(uv);
   return svg`<circle cx=${x} cy=${y} r="5" fill=${color} stroke="#1c2026" stroke-width="1.5" />`;
 }

@@ -25,7 +25,8 @@ import { type KeyDialog, TabKeys } from './key_dialog.js';
 import './look_panel.js';
 import './report_panel.js';
 import './save_panel.js';
-import { Stage } from './stage.js';
+import './stage.js';
+import type { Stage } from './stage.js';
 import { shared } from './styles.js';
 import { TOOLS, needsCloth } from './tools_panel.js';
 
