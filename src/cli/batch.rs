@@ -4,7 +4,7 @@
 //! outputs are renamed into place when they are whole.
 
 use super::failure::{Failure, OrFail};
-use super::inpaint::{FileMender, FileOutcome, InpaintArgs, ReportLine};
+use super::inpaint::{BatchPlace, FileMender, FileOutcome, InpaintArgs, ReportLine, stage_line};
 use std::fs;
 use std::io::Write as _;
 use std::path::{Component, Path, PathBuf};
@@ -29,13 +29,19 @@ pub fn run(args: &InpaintArgs, source: &Path) -> Result<(), Failure> {
     };
     let mender = FileMender::new(args)?;
     let mut failed = 0;
-    for file in &files {
-        let line = mended(file, args, &mender);
+    for (before, file) in files.iter().enumerate() {
+        let place = BatchPlace {
+            done: before,
+            of: files.len(),
+        };
+        let mut line = mended(file, args, &mender, place);
         failed += usize::from(line.outcome.is_failure());
-        let mut out = std::io::stdout().lock();
-        let text = line.text()?;
-        // A reader that went away must not end the batch: the outputs are what it is about.
-        writeln!(out, "{text}").and_then(|()| out.flush()).ok();
+        line.place = Some(BatchPlace {
+            done: before + 1,
+            ..place
+        });
+        print(&line.text()?);
+        writeln!(std::io::stderr(), "{}", line.summary()).ok();
     }
     match failed {
         0 => Ok(()),
@@ -43,9 +49,29 @@ pub fn run(args: &InpaintArgs, source: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Mends a scan of a batch and tells how it went.
-fn mended(file: &BatchFile, args: &InpaintArgs, mender: &FileMender) -> ReportLine {
+/// Prints a line. A reader that went away must not end the batch: the outputs are what it is about.
+fn print(line: &str) {
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{line}").and_then(|()| out.flush()).ok();
+}
+
+/// Mends a scan of a batch and tells how it went; `place` is how far the batch is before.
+fn mended(
+    file: &BatchFile,
+    args: &InpaintArgs,
+    mender: &FileMender,
+    place: BatchPlace,
+) -> ReportLine {
     let started = Instant::now();
+    let stage = |stage: &str| {
+        if args.json_lines {
+            let mut line = stage_line(stage, started);
+            line["scan"] = file.scan.to_string_lossy().into();
+            line["done"] = place.done.into();
+            line["of"] = place.of.into();
+            print(&line.to_string());
+        }
+    };
     let output = args.output.join(&file.below);
     let outcome = if output.exists() {
         FileOutcome::DoneBefore
@@ -54,7 +80,7 @@ fn mended(file: &BatchFile, args: &InpaintArgs, mender: &FileMender) -> ReportLi
         let folder = output.parent().unwrap_or(Path::new(""));
         let made = fs::create_dir_all(folder).or_fail(format!("create {}", folder.display()));
         // The report first: a scan that is there is done.
-        let mended = made.and_then(|()| mender.mend(&file.scan, &output, Some(&report), &|_| {}));
+        let mended = made.and_then(|()| mender.mend(&file.scan, &output, Some(&report), &stage));
         mended.unwrap_or_else(FileOutcome::Failed)
     };
     ReportLine::new(&file.scan, &output, outcome, started)

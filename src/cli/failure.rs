@@ -1,9 +1,10 @@
 //! How a command fails: one line of text and an exit code.
 
-use darn_contract::{Code, error_chain};
+use darn_contract::{Code, codes, error_chain};
 use darn_gltf_scan::ScanError;
 use darn_mend::MendError;
 use std::error::Error;
+use std::io;
 
 /// Why a command failed.
 #[derive(Debug, thiserror::Error)]
@@ -30,14 +31,24 @@ impl Failure {
         }
     }
 
-    /// The code of an error of mending, or of reading a scan.
-    pub fn mend_code(&self) -> Option<Code> {
+    /// The row of the table of error codes: that of an error of mending or of reading a scan; `not_found` and `storage_full` of files; `internal` of
+    /// files that cannot be read or written for another reason; `malformed_request` of wrong usage.
+    pub fn row(&self) -> Code {
         let Self::Failed { cause, .. } = self else {
-            return None;
+            return codes::MALFORMED_REQUEST;
         };
         let mending = cause.downcast_ref::<MendError>().map(MendError::code);
         let reading = cause.downcast_ref::<ScanError>();
-        mending.or_else(|| reading.map(darn_mend::reading_code))
+        let file = cause.downcast_ref::<io::Error>().map(io::Error::kind);
+        mending
+            .or_else(|| reading.map(darn_mend::reading_code))
+            .unwrap_or(match file {
+                Some(io::ErrorKind::NotFound) => codes::NOT_FOUND,
+                Some(io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded) => {
+                    codes::STORAGE_FULL
+                }
+                _ => codes::INTERNAL,
+            })
     }
 }
 
@@ -64,6 +75,20 @@ mod tests {
     #[error("outer: {source}")]
     struct Outer {
         source: std::io::Error,
+    }
+
+    #[test]
+    fn every_failure_has_a_row_of_the_table() {
+        let of = |kind: io::ErrorKind| Err::<(), _>(io::Error::from(kind)).or_fail("read a.glb");
+        for (kind, code) in [
+            (io::ErrorKind::NotFound, "not_found"),
+            (io::ErrorKind::StorageFull, "storage_full"),
+            (io::ErrorKind::PermissionDenied, "internal"),
+        ] {
+            assert_eq!(of(kind).unwrap_err().row().word, code);
+        }
+        let usage = Failure::Usage("no such option".to_owned());
+        assert_eq!(usage.row().word, "malformed_request");
     }
 
     #[test]

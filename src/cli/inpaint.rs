@@ -29,9 +29,9 @@ pub struct InpaintArgs {
     /// What becomes of a scan without holes
     #[arg(long, value_name = "WHAT", default_value = "fail")]
     if_no_holes: IfNoHoles,
-    /// Print lines of JSON: one when a stage begins, and one with the outcome and the report
+    /// Print lines of JSON: one when a stage begins, and one with the outcome and the report. A batch prints the latter in any case
     #[arg(long)]
-    json_lines: bool,
+    pub json_lines: bool,
     /// What the new cloth is to keep to, as JSON
     #[arg(short, long)]
     constraints: Option<PathBuf>,
@@ -168,7 +168,7 @@ impl<'a> FileMender<'a> {
         let mut mended = match darn_mend::mend(&read_scan, &self.constraints, call) {
             Err(MendError::NoHoles { .. }) if self.args.if_no_holes == IfNoHoles::Copy => {
                 stage("copying");
-                files::write(output, &files::read(scan)?)?;
+                files::write_scan(output, &read_scan, &files::read(scan)?)?;
                 return Ok(FileOutcome::Copied);
             }
             mended => mended.or_fail(format!("mend {}", scan.display()))?,
@@ -231,6 +231,15 @@ impl FileOutcome {
     }
 }
 
+/// How far a batch is.
+#[derive(Debug, Clone, Copy)]
+pub struct BatchPlace {
+    /// Scans that are finished.
+    pub done: usize,
+    /// All of its scans.
+    pub of: usize,
+}
+
 /// The line of JSON about a file.
 pub struct ReportLine {
     scan: PathBuf,
@@ -238,6 +247,8 @@ pub struct ReportLine {
     /// How it went.
     pub outcome: FileOutcome,
     seconds: f64,
+    /// In a batch.
+    pub place: Option<BatchPlace>,
 }
 
 impl ReportLine {
@@ -248,7 +259,23 @@ impl ReportLine {
             output: output.to_owned(),
             outcome,
             seconds: started.elapsed().as_secs_f64(),
+            place: None,
         }
+    }
+
+    /// The line about a scan of a batch for a person: how far the batch is, the scan, and how it went.
+    pub fn summary(&self) -> String {
+        let place = self
+            .place
+            .map_or_else(String::new, |BatchPlace { done, of }| {
+                format!("{done} of {of}: ")
+            });
+        let detail = match &self.outcome {
+            FileOutcome::Failed(failure) => format!(": {failure}"),
+            _ => String::new(),
+        };
+        let (scan, word) = (self.scan.display(), self.outcome.word());
+        format!("{place}{scan}: {word}, {:.1} s{detail}", self.seconds)
     }
 
     /// The line, without its end.
@@ -260,6 +287,10 @@ impl ReportLine {
             "status": self.outcome.word(),
             "seconds": (self.seconds * 1e3).round() / 1e3,
         });
+        if let Some(BatchPlace { done, of }) = self.place {
+            line["done"] = done.into();
+            line["of"] = of.into();
+        }
         match &self.outcome {
             FileOutcome::Mended(report) => {
                 let outcome = Outcome::of(report);
@@ -269,7 +300,7 @@ impl ReportLine {
                 line["report"] = serde_json::to_value(report).or_fail("write the report")?;
             }
             FileOutcome::Failed(failure) => {
-                line["code"] = failure.mend_code().map(|code| code.word).into();
+                line["code"] = failure.row().word.into();
                 line["detail"] = failure.to_string().into();
             }
             FileOutcome::Copied | FileOutcome::DoneBefore => {}
@@ -279,9 +310,9 @@ impl ReportLine {
 }
 
 /// The line of JSON about a stage that begins.
-fn stage_line(stage: &str, started: Instant) -> String {
+pub fn stage_line(stage: &str, started: Instant) -> serde_json::Value {
     let seconds = (started.elapsed().as_secs_f64() * 1e3).round() / 1e3;
-    serde_json::json!({"type": "stage", "stage": stage, "seconds": seconds}).to_string()
+    serde_json::json!({"type": "stage", "stage": stage, "seconds": seconds})
 }
 
 /// Writes the provenance of a mend; `text` is its report as it was written.
