@@ -3,7 +3,9 @@
 use super::failure::{Failure, OrFail};
 use crate::settings::SizeArgs;
 use darn_budget::Budget;
-use darn_gltf_scan::{Container, Scan, Siblings, sibling_paths};
+use darn_gltf_scan::{
+    Container, Scan, Siblings, material_image_paths, material_library_paths, sibling_paths,
+};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs;
@@ -14,14 +16,14 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     fs::read(path).or_fail(format!("read {}", path.display()))
 }
 
-/// A scan, and the files beside it that its glTF refers to by relative paths. No file above the glTF's folder is read.
+/// A scan, and the files beside it that a glTF, or an OBJ with its material libraries, refers to by relative paths. No file above the scan's folder is read.
 pub fn read_scan(path: &Path, size: &SizeArgs, budget: &Budget<'_>) -> Result<Scan, Failure> {
     let reading = || format!("read {}", path.display());
     let bytes = read(path)?;
     let files = if is_json(&bytes) {
         siblings(path, sibling_paths(&bytes).or_fail(reading())?)?
     } else {
-        Siblings::default()
+        materials(path, &bytes)?
     };
     Scan::read_with_siblings(bytes, files, &size.limits(), budget).or_fail(reading())
 }
@@ -31,7 +33,18 @@ fn is_json(bytes: &[u8]) -> bool {
     text.trim_ascii_start().starts_with(b"{")
 }
 
-/// Those of the files below a glTF's folder that are there; reading the scan names one that it misses.
+/// The material libraries of an OBJ and the images that they name, as far as they are there; of another scan none.
+fn materials(obj: &Path, bytes: &[u8]) -> Result<Siblings, Failure> {
+    let Siblings(mut files) = siblings(obj, material_library_paths(bytes))?;
+    let images = files
+        .iter()
+        .flat_map(|(path, library)| material_image_paths(path, library));
+    let images = siblings(obj, images.collect())?;
+    files.extend(images.0);
+    Ok(Siblings(files))
+}
+
+/// Those of the files below a scan's folder that are there; reading the scan names one that it misses.
 fn siblings(gltf: &Path, paths: Vec<String>) -> Result<Siblings, Failure> {
     let folder = gltf.parent().unwrap_or(Path::new(""));
     let mut files = BTreeMap::new();
@@ -64,7 +77,7 @@ pub fn packed_scan(path: &Path, scan: &Scan, mended: &[u8]) -> Result<Option<Vec
     Ok(None)
 }
 
-/// Writes a mended scan in the container it was read from. A glTF written into another folder takes its files there; a file that is there already stays.
+/// Writes a mended scan in the container it was read from. A glTF or an OBJ written into another folder takes its files there; a file that is there already stays.
 pub fn write_scan(path: &Path, scan: &Scan, mended: &[u8]) -> Result<(), Failure> {
     let folder = path.parent().unwrap_or(Path::new(""));
     for (name, bytes) in scan.siblings() {

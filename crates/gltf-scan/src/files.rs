@@ -1,4 +1,4 @@
-//! Scans of several files: a glTF and the files that it refers to by relative URIs.
+//! Scans of several files: a glTF and the files that it refers to by relative URIs, an OBJ and its material libraries with their images.
 //!
 //! Nothing here opens a file: the caller gives the bytes, by path, or in a zip. A URI that leads anywhere else than to a
 //! file beside or below the glTF is refused.
@@ -6,13 +6,14 @@
 use std::collections::BTreeMap;
 
 use bytes::Bytes;
+use darn_mesh_files::{MeshFormat, material_images, material_libraries};
 use serde_json::Value;
 
 use super::compressed::DecodeAllowance;
 use super::error::ScanError;
 use super::zip_files::ZipFiles;
 
-/// The files that lie beside a glTF, by their paths relative to it, with `/` between folders.
+/// The files that lie beside a glTF or an OBJ, by their paths relative to it, with `/` between folders.
 #[derive(Debug, Clone, Default)]
 pub struct Siblings(pub BTreeMap<String, Bytes>);
 
@@ -72,6 +73,31 @@ pub fn sibling_paths(gltf: &[u8]) -> Result<Vec<String>, ScanError> {
         .filter(|uri| !uri.starts_with("data:"))
         .flat_map(paths)
         .collect())
+}
+
+/// The paths of the files beside an OBJ that its `mtllib` lines may name; none of another scan. Without absolute paths, URLs, and paths that lead
+/// upward; a line stands for all that it may mean ([`darn_mesh_files::material_libraries`]).
+pub fn material_library_paths(obj: &[u8]) -> Vec<String> {
+    if MeshFormat::of(obj) != Some(MeshFormat::Obj) {
+        return Vec::new();
+    }
+    let names = material_libraries(obj);
+    names.iter().filter_map(|name| relative(name)).collect()
+}
+
+/// The paths of the files beside an OBJ that one of its material libraries may name as images, relative to the library or to the OBJ; `library` is
+/// the library's path. As [`material_library_paths`].
+pub fn material_image_paths(library: &str, bytes: &[u8]) -> Vec<String> {
+    let folder = library.rsplit_once('/').map_or("", |(folder, _)| folder);
+    let names = material_images(bytes);
+    let paths = names.iter().flat_map(|name| {
+        // Only a path that is relative by itself is put behind a folder.
+        let own = relative(name);
+        let below = own.as_ref().map(|own| format!("{folder}/{own}"));
+        own.into_iter()
+            .chain(below.and_then(|path| relative(path.trim_start_matches('/'))))
+    });
+    paths.collect()
 }
 
 /// The JSON of a glTF that is no GLB, with or without a byte order mark.
@@ -137,6 +163,20 @@ fn percent_decoded(uri: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_obj_names_libraries_and_those_name_images_beside_and_below() {
+        let obj = b"mtllib mats/a.mtl\nmtllib ../b.mtl\nmtllib /c.mtl\nmtllib C:\\d.mtl\nv 0 0 0\n";
+        assert_eq!(material_library_paths(obj), ["mats/a.mtl"]);
+        assert_eq!(material_library_paths(b"{}"), Vec::<String>::new());
+        let library = b"map_Kd ..\\up.png\nmap_Kd http://example.org/a.png\nmap_Kd ./linen.png\n";
+        let expected = ["linen.png", "mats/linen.png"];
+        assert_eq!(material_image_paths("mats/a.mtl", library), expected);
+        assert_eq!(
+            material_image_paths("a.mtl", b"bump x.png"),
+            ["x.png", "x.png"]
+        );
+    }
 
     #[test]
     fn only_paths_beside_and_below_are_followed() {

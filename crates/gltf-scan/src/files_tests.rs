@@ -1,7 +1,7 @@
 //! Laws of scans that come in several files.
 
 use std::collections::BTreeMap;
-use std::io::{Cursor, Write as _};
+use std::io::{Cursor, Read as _, Write as _};
 
 use bytes::Bytes;
 use darn_budget::Budget;
@@ -13,7 +13,7 @@ use zip::{CompressionMethod, ZipArchive, ZipWriter};
 use super::testing::Builder;
 use super::{
     Container, PatchPoint, PatchPrimitive, Scan, ScanError, ScanLimits, Siblings, repacked,
-    sibling_paths,
+    sibling_paths, stripped,
 };
 
 const PICTURE: &[u8] = b"\x89PNG of a plaid";
@@ -285,4 +285,81 @@ fn zips_that_are_no_scan_are_refused() {
     };
     let error = Scan::read(whole, &tight).unwrap_err();
     assert!(error.to_string().contains("max_decoded_bytes"), "{error}");
+}
+
+/// A square of two triangles, which uses a material.
+const OBJ: &str =
+    "mtllib cloth.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nusemtl linen\nf 1 2 3\nf 1 3 4\n";
+const MTL: &[u8] = b"newmtl linen\nmap_Kd maps/linen.png\n";
+
+#[test]
+fn an_obj_in_a_zip_is_mended_there_beside_its_files() {
+    let zip = zipped(&[
+        ("cloth/cloth.obj", OBJ.as_bytes()),
+        ("cloth/cloth.mtl", MTL),
+        ("cloth/maps/linen.png", PICTURE),
+    ]);
+    let limits = ScanLimits::default();
+    let scan = Scan::read(zip.clone(), &limits).unwrap();
+    assert_eq!(scan.container(), Container::Zip);
+    assert_eq!(scan.surface.faces.len(), 2);
+    assert_eq!(scan.write(&[]).unwrap(), zip);
+    let mended = scan.write(&[patch()]).unwrap();
+    let again = Scan::read(mended.clone(), &limits).unwrap();
+    assert_eq!(again.surface.faces.len(), 3);
+    let mut archive = ZipArchive::new(Cursor::new(mended.clone())).unwrap();
+    for (name, bytes) in [("cloth/cloth.mtl", MTL), ("cloth/maps/linen.png", PICTURE)] {
+        let mut found = Vec::new();
+        archive
+            .by_name(name)
+            .unwrap()
+            .read_to_end(&mut found)
+            .unwrap();
+        assert_eq!(found, bytes, "{name}");
+    }
+    // An OBJ is no glTF: in any other form it comes alone.
+    for form in [Container::Gltf, Container::Glb] {
+        let (container, obj) =
+            repacked(mended.clone(), form, &limits, Budget::unlimited()).unwrap();
+        assert_eq!(container, Container::Obj);
+        assert!(obj.starts_with(OBJ.as_bytes()) && obj.len() > OBJ.len());
+    }
+    let stripped = stripped(mended, &limits, Budget::unlimited())
+        .unwrap()
+        .unwrap();
+    assert!(stripped.exact && stripped.marks.patches == 1);
+    assert_eq!((stripped.container, stripped.bytes), (Container::Zip, zip));
+}
+
+#[test]
+fn a_mended_obj_that_others_zipped_is_stripped_in_its_zip() {
+    let limits = ScanLimits::default();
+    let scan = Scan::read(OBJ.as_bytes(), &limits).unwrap();
+    let mended = scan.write(&[patch()]).unwrap();
+    let zip = zipped(&[("cloth.obj", &mended), ("cloth.mtl", MTL)]);
+    let stripped = stripped(zip, &limits, Budget::unlimited())
+        .unwrap()
+        .unwrap();
+    assert!(stripped.exact && stripped.mends == 1);
+    let scan = Scan::read(stripped.bytes, &limits).unwrap();
+    assert_eq!(scan.digests(), &crate::FileDigests::of(OBJ.as_bytes()));
+}
+
+#[test]
+fn a_gltf_in_a_zip_goes_before_other_meshes() {
+    let (gltf, bin) = separate("cloth.bin");
+    let zip = zipped(&[
+        ("a.obj", OBJ.as_bytes()),
+        ("cloth.gltf", &gltf),
+        ("cloth.bin", &bin),
+    ]);
+    let (limits, budget) = (ScanLimits::default(), Budget::unlimited());
+    let (container, main) = repacked(zip, Container::Gltf, &limits, budget).unwrap();
+    assert_eq!((container, main), (Container::Gltf, gltf));
+    let two = zipped(&[("a.obj", OBJ.as_bytes()), ("b.ply", b"ply\n")]);
+    let refused = Scan::read(two, &ScanLimits::default()).unwrap_err();
+    assert!(
+        refused.to_string().contains("it holds 2 scans"),
+        "{refused}"
+    );
 }

@@ -82,7 +82,7 @@ pub use content::SceneContent;
 pub use darn_mesh_files::MeshFileError;
 pub use digests::FileDigests;
 pub use error::ScanError;
-pub use files::{Siblings, sibling_paths};
+pub use files::{Siblings, material_image_paths, material_library_paths, sibling_paths};
 pub use images::{DecodedImage, ImageError};
 pub use left_out::NamedPlace;
 pub use limits::ScanLimits;

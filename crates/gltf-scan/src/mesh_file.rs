@@ -38,9 +38,9 @@ impl MeshOrigin {
         self.file.bytes()
     }
 
-    /// The container of scans like it.
+    /// The container of scans like it that are one file.
     pub fn container(&self) -> Container {
-        container(self.file.format())
+        mesh_container(self.file.format())
     }
 
     /// Bytes of memory that it holds, estimated.
@@ -88,7 +88,8 @@ impl MeshOrigin {
     }
 }
 
-fn container(format: MeshFormat) -> Container {
+/// The container of a mesh file.
+pub(super) fn mesh_container(format: MeshFormat) -> Container {
     match format {
         MeshFormat::Obj => Container::Obj,
         MeshFormat::Ply => Container::Ply,
@@ -100,13 +101,14 @@ const CONVERTED: usize = 350;
 /// Nanoseconds of work a triangle of that.
 const FACE_WORK: u64 = 500;
 
-/// Reads a scan from a mesh file.
+/// Reads a scan from a mesh file, which came alone, with files beside it, or in a zip.
 ///
 /// # Errors
 /// [`ScanError::MeshFile`]; `Exhausted`.
 pub(super) fn read_mesh_file(
     bytes: Bytes,
     format: MeshFormat,
+    companions: Companions,
     allowance: DecodeAllowance<'_>,
 ) -> Result<Scan, ScanError> {
     let limits = MeshFileLimits {
@@ -132,8 +134,9 @@ pub(super) fn read_mesh_file(
     })?;
     budget.release(CONVERTED * faces);
     budget.hold(as_gltf.glb.len())?;
-    let companions = Companions::Siblings(Siblings::default());
-    let mut scan = read_files(as_gltf.glb.into(), companions, allowance)?;
+    let alone = Companions::Siblings(Siblings::default());
+    let mut scan = read_files(as_gltf.glb.into(), alone, allowance)?;
+    scan.companions = companions;
     // The file has more digits than a glTF.
     for (position, vertex) in scan.surface.positions.iter_mut().zip(&as_gltf.vertex_of) {
         *position = mesh.positions[*vertex as usize].into();
@@ -307,7 +310,7 @@ pub(super) fn stripped_mesh_file(
         "the file was changed after darn mended it; the patches were taken out of what it is now";
     Ok((mends > 0).then(|| Stripped {
         bytes,
-        container: container(format),
+        container: mesh_container(format),
         exact,
         mends,
         marks,

@@ -2,6 +2,7 @@
 
 use bytes::Bytes;
 use darn_budget::Budget;
+use darn_mesh_files::MeshFormat;
 use serde_json::{Map, Value, json};
 
 use super::buffers::decode_data_uri;
@@ -11,6 +12,7 @@ use super::error::ScanError;
 use super::files::{Companions, json_of_text};
 use super::json::JsonPlace;
 use super::limits::ScanLimits;
+use super::mesh_file::mesh_container;
 use super::scan::Scan;
 use super::zip_files::ZipFiles;
 
@@ -38,7 +40,7 @@ impl Scan {
 }
 
 /// The scan of a zip in another container: the glTF alone, or a GLB with all its files. Also returns the container: a zip's
-/// GLB stays a GLB.
+/// GLB stays a GLB, its OBJ or PLY stays one and comes alone.
 ///
 /// # Errors
 /// As [`Scan::packed`]; `Exhausted`.
@@ -51,6 +53,9 @@ pub fn repacked(
     let allowance = DecodeAllowance::new(limits, budget);
     let zip = ZipFiles::open(zip.into())?;
     let main = zip.main(&allowance)?;
+    if let Some(format) = MeshFormat::of(&main) {
+        return Ok((mesh_container(format), main.to_vec()));
+    }
     let found = layout(&main)?.container;
     let bytes = match (container, found) {
         (Container::Glb, Container::Gltf) => {

@@ -51,7 +51,7 @@ impl Scan {
         read(bytes.into(), Siblings::default(), limits, budget)
     }
 
-    /// [`Scan::read_within`], with the files beside a glTF.
+    /// [`Scan::read_within`], with the files beside a glTF, or beside an OBJ, which are not looked at.
     ///
     /// # Errors
     /// As [`Scan::read_within`].
@@ -80,10 +80,13 @@ fn read(
     if bytes.starts_with(zip_files::MAGIC) {
         let zip = ZipFiles::open(bytes)?;
         let main = zip.main(&allowance)?;
+        if let Some(format) = MeshFormat::of(&main) {
+            return read_mesh_file(main, format, Companions::Zip(zip), allowance);
+        }
         return read_files(main, Companions::Zip(zip), allowance);
     }
     if let Some(format) = MeshFormat::of(&bytes) {
-        return read_mesh_file(bytes, format, allowance);
+        return read_mesh_file(bytes, format, Companions::Siblings(siblings), allowance);
     }
     read_files(bytes, Companions::Siblings(siblings), allowance)
 }

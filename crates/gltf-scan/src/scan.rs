@@ -102,8 +102,8 @@ impl Scan {
     /// The container it was read from; [`Scan::write`] writes the same.
     pub fn container(&self) -> Container {
         match (&self.origin, &self.companions) {
+            (_, Companions::Zip(_)) => Container::Zip,
             (Some(origin), _) => origin.container(),
-            (None, Companions::Zip(_)) => Container::Zip,
             _ => self.layout.container,
         }
     }

@@ -133,7 +133,13 @@ fn stripped_zip(
     let (limits, budget) = (allowance.limits, allowance.budget);
     let mut zip = ZipFiles::open(bytes.clone())?;
     let main = zip.main(allowance)?;
-    let marks = Marks::of(&json_of(&main, limits, budget)?);
+    let marks = match MeshFormat::of(&main) {
+        Some(format) => {
+            let found = stripped_mesh_file(main.clone(), format, budget)?;
+            found.map_or_else(Marks::default, |found| found.marks)
+        }
+        None => Marks::of(&json_of(&main, limits, budget)?),
+    };
     let input = FileDigests::of(&main);
     let mut mends = 0;
     while let Some(before) = zip.before(allowance)? {
@@ -143,7 +149,10 @@ fn stripped_zip(
         mends += 1;
     }
     let main = zip.main(allowance)?;
-    let inner = stripped_file(main.clone(), limits, budget)?;
+    let inner = match MeshFormat::of(&main) {
+        Some(format) => stripped_mesh_file(main.clone(), format, budget)?,
+        None => stripped_file(main.clone(), limits, budget)?,
+    };
     let stripped = match inner {
         None if mends == 0 => return Ok(None),
         None => Stripped {

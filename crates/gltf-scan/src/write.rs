@@ -56,8 +56,8 @@ impl Scan {
         budget.spend(DIGEST_WORK * self.bytes.len() as u64)?;
         if patches.is_empty() && self.cut.is_empty() {
             let bytes = match (&self.origin, &self.companions) {
+                (_, Companions::Zip(zip)) => &zip.bytes,
                 (Some(origin), _) => origin.bytes(),
-                (None, Companions::Zip(zip)) => &zip.bytes,
                 _ => &self.bytes,
             };
             return Ok(WrittenScan {
@@ -70,6 +70,10 @@ impl Scan {
             budget.check_output(bytes.len())?;
             budget.spend(DIGEST_WORK * bytes.len() as u64)?;
             let digests = FileDigests::of(&bytes);
+            let bytes = match &self.companions {
+                Companions::Zip(zip) => zip.with_main(&bytes)?,
+                Companions::Siblings(_) => bytes,
+            };
             return Ok(WrittenScan { bytes, digests });
         }
         let mut out = Appender::new(self);

@@ -1,4 +1,4 @@
-//! A zip with a glTF and its files: entries are read when they are needed, and copied as they are into the mended zip.
+//! A zip with a glTF, an OBJ or a PLY, and its files: entries are read when they are needed, and copied as they are into the mended zip.
 
 use std::collections::BTreeMap;
 use std::io::{Cursor, Read, Write};
@@ -37,7 +37,7 @@ const BYTE_WORK: u64 = 5;
 pub(super) struct ZipFiles {
     /// The whole zip.
     pub bytes: Bytes,
-    /// Name of the glTF in it, as spelled there.
+    /// Name of the scan in it, as spelled there.
     pub main: String,
     /// Per path in the zip the number of its entry, however the name is spelled: `./a`, `b\\a`, `b//a`.
     places: Arc<BTreeMap<String, usize>>,
@@ -46,7 +46,7 @@ pub(super) struct ZipFiles {
 }
 
 impl ZipFiles {
-    /// Finds the one glTF in a zip.
+    /// Finds the one glTF in a zip, or the one OBJ or PLY of a zip without glTFs.
     pub fn open(bytes: Bytes) -> Result<Self, ScanError> {
         // Before the directory is read, which takes ten times its bytes of memory.
         let headers = bytes.windows(ENTRY_MAGIC.len());
@@ -57,19 +57,26 @@ impl ZipFiles {
             )));
         }
         let archive = ZipArchive::new(Cursor::new(bytes.clone())).map_err(zip_error)?;
-        let is_scan = |name: &&str| {
+        let is_scan = |name: &&str, endings: [&str; 2]| {
             let path = relative(name).unwrap_or_default();
             let hidden = path
                 .split('/')
                 .any(|part| part.starts_with('.') || part == "__MACOSX");
             let lower = path.to_ascii_lowercase();
-            !hidden && (lower.ends_with(".gltf") || lower.ends_with(".glb"))
+            !hidden && endings.iter().any(|ending| lower.ends_with(ending))
         };
-        let mut scans: Vec<&str> = archive.file_names().filter(is_scan).collect();
+        let named = |endings| -> Vec<&str> {
+            let names = archive.file_names();
+            names.filter(|name| is_scan(name, endings)).collect()
+        };
+        let mut scans = named([".gltf", ".glb"]);
+        if scans.is_empty() {
+            scans = named([".obj", ".ply"]);
+        }
         scans.sort_unstable();
         let main = match scans.as_slice() {
             [main] => (*main).to_owned(),
-            [] => return Err(broken("it holds no .gltf and no .glb".into())),
+            [] => return Err(broken("it holds no .gltf, .glb, .obj or .ply".into())),
             [a, b, ..] => {
                 return Err(broken(format!(
                     "it holds {} scans ({a:?}, {b:?}); send one at a time",
@@ -86,7 +93,7 @@ impl ZipFiles {
         })
     }
 
-    /// The glTF.
+    /// The scan.
     pub fn main(&self, allowance: &DecodeAllowance<'_>) -> Result<Bytes, ScanError> {
         let main = self.named(&self.main, allowance)?;
         main.ok_or_else(|| broken(format!("{:?} is not there", self.main)))

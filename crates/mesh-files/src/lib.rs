@@ -15,6 +15,7 @@ mod error;
 #[cfg(test)]
 mod laws;
 mod mesh;
+mod mtl;
 mod obj;
 mod ply;
 mod ply_header;
@@ -28,6 +29,7 @@ use darn_budget::Budget;
 pub use added::{AddedPatch, AddedPoint};
 pub use error::MeshFileError;
 pub use mesh::{Corner, FaceGroup, FileMesh};
+pub use mtl::{material_images, material_libraries};
 
 use obj::ObjFile;
 use ply::PlyFile;

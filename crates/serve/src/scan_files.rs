@@ -170,8 +170,13 @@ fn stored(
     files: &BTreeMap<String, Bytes>,
     length: usize,
 ) -> Result<Vec<u8>, RequestError> {
+    let text = scan.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(scan);
     let main = if scan.starts_with(b"glTF") {
         "scan.glb"
+    } else if scan.starts_with(b"ply\n") || scan.starts_with(b"ply\r") {
+        "scan.ply"
+    } else if begins_as_obj(text) {
+        "scan.obj"
     } else {
         "scan.gltf"
     };
