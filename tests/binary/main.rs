@@ -1,10 +1,12 @@
 //! The binary as a user meets it: `darn serve` on a real socket, and the commands beside it.
 
 mod files;
+mod cook;
 #[cfg(target_os = "linux")]
 mod full_disk;
 mod kills;
 mod many;
+mod materials;
 #[path = "../../crates/jobs/tests/laws/postgres.rs"]
 mod postgres;
 mod running;
@@ -15,7 +17,10 @@ mod traces;
 mod webhooks;
 
 use running::Service;
-use std::process::Command;
+use std::{
+    io::Write as _,
+    process::{Command, Stdio},
+};
 
 const EXAMPLE: &[u8] = include_bytes!("../../examples/scarf_hole.glb");
 
@@ -308,6 +313,8 @@ fn a_batch_tells_of_each_scan_goes_on_after_failures_and_is_resumed() {
         Some(1)
     );
     assert_eq!(told("code")[1..], ["invalid_mesh_file", "no_holes"]);
+    assert_eq!(told("done"), [1, 2, 3]);
+    assert_eq!(told("of"), [3, 3, 3]);
     // The bytes are those of a mend by itself.
     let alone = folder.path().join("alone.glb");
     let status = darn()
@@ -364,6 +371,60 @@ fn lines_of_json_tell_stages_and_the_outcome() {
     assert_eq!(
         (code, lines.last().map(|line| line["status"] == "copied")),
         (Some(0), Some(true))
+    );
+}
+
+#[test]
+fn a_batch_tells_how_far_it_is_to_programs_and_to_people() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (there, missing) = (folder.path().join("a.glb"), folder.path().join("b.glb"));
+    std::fs::write(&there, EXAMPLE).expect("written");
+    let list = format!("{}\n{}\n", there.display(), missing.display());
+    let mut child = darn()
+        .args(["inpaint", "--batch", "-", "--json-lines", "-o"])
+        .arg(folder.path().join("out"))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("darn runs");
+    let mut input = child.stdin.take().expect("piped");
+    input.write_all(list.as_bytes()).expect("written");
+    drop(input);
+    let ran = child.wait_with_output().expect("darn runs");
+    assert_eq!(ran.status.code(), Some(1));
+    let text = String::from_utf8(ran.stdout).expect("text");
+    let lines: Vec<serde_json::Value> = (text.lines())
+        .map(|line| serde_json::from_str(line).expect("a line of JSON"))
+        .collect();
+    let of = |kind: &str| -> Vec<&serde_json::Value> {
+        lines.iter().filter(|line| line["type"] == kind).collect()
+    };
+    let stages = of("stage");
+    let first: Vec<&serde_json::Value> = (stages.iter())
+        .filter(|line| line["scan"] == there.to_str().expect("a name"))
+        .map(|line| &line["stage"])
+        .collect();
+    assert_eq!(first, ["reading", "mending", "writing"]);
+    assert!(stages.iter().all(|line| line["of"] == 2));
+    assert_eq!(
+        (&stages[0]["done"], &stages[3]["done"]),
+        (&0.into(), &1.into())
+    );
+    let reports = of("report");
+    assert_eq!(reports[0]["status"], "mended");
+    assert_eq!(
+        (&reports[1]["status"], &reports[1]["code"]),
+        (&"failed".into(), &"not_found".into())
+    );
+    let told = String::from_utf8(ran.stderr).expect("text");
+    assert!(
+        told.contains("1 of 2: ") && told.contains("a.glb: mended, "),
+        "{told}"
+    );
+    assert!(
+        told.contains("2 of 2: ") && told.contains("b.glb: failed, "),
+        "{told}"
     );
 }
 

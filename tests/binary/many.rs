@@ -12,7 +12,7 @@ use tempfile::TempDir;
 use crate::{
     EXAMPLE,
     postgres::Server,
-    running::{Service, client},
+    running::{Service, client, sheet},
 };
 
 /// Longer than anything here takes, on a machine that is busy.
@@ -134,28 +134,9 @@ impl Shared {
     }
 }
 
-/// A wavy sheet with a hole, as OBJ: large enough that its mend takes a while.
+/// A scan that is large enough for its mend to take a while.
 fn large_sheet() -> Vec<u8> {
-    const SIDE: usize = 160;
-    const HOLE: std::ops::Range<usize> = 74..86;
-    let mut text = String::new();
-    for (i, j) in (0..SIDE * SIDE).map(|k| (k / SIDE, k % SIDE)) {
-        let height = (i as f64 * 0.1).sin() * 0.02;
-        text.push_str(&format!(
-            "v {} {} {height:.6}\n",
-            i as f64 * 0.01,
-            j as f64 * 0.01
-        ));
-    }
-    for (i, j) in (0..SIDE * SIDE).map(|k| (k / SIDE, k % SIDE)) {
-        let is_inside = i + 1 < SIDE && j + 1 < SIDE;
-        if is_inside && !(HOLE.contains(&i) && HOLE.contains(&j)) {
-            let a = i * SIDE + j + 1;
-            let (b, c, d) = (a + SIDE, a + SIDE + 1, a + 1);
-            text.push_str(&format!("f {a} {b} {c} {d}\n"));
-        }
-    }
-    text.into_bytes()
+    sheet(160, 74..86).into_bytes()
 }
 
 #[tokio::test]

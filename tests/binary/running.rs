@@ -3,6 +3,7 @@
 use std::{
     io::{BufRead, BufReader},
     net::SocketAddr,
+    ops::Range,
     process::{Child, Command, Stdio},
     sync::{Arc, Mutex},
     time::Duration,
@@ -16,6 +17,26 @@ pub fn client() -> reqwest::Client {
         .install_default()
         .ok();
     reqwest::Client::new()
+}
+
+/// A wavy sheet of so many vertices a side, with a square hole, as OBJ.
+pub fn sheet(side: usize, hole: Range<usize>) -> String {
+    let places = || (0..side * side).map(|k| (k / side, k % side));
+    let mut text = String::new();
+    for (i, j) in places() {
+        let height = (i as f64 * 0.1).sin() * 0.02;
+        let (x, y) = (i as f64 * 0.01, j as f64 * 0.01);
+        text.push_str(&format!("v {x} {y} {height:.6}\n"));
+    }
+    for (i, j) in places() {
+        let is_inside = i + 1 < side && j + 1 < side;
+        if is_inside && !(hole.contains(&i) && hole.contains(&j)) {
+            let a = i * side + j + 1;
+            let (b, c, d) = (a + side, a + side + 1, a + 1);
+            text.push_str(&format!("f {a} {b} {c} {d}\n"));
+        }
+    }
+    text
 }
 
 /// A running `darn serve`; killed when dropped.
