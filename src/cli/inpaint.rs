@@ -5,10 +5,13 @@ use super::files;
 use super::holes::{kind_name, set_aside};
 use super::network::mender;
 use super::progress::WorkProgress;
-use super::provenance;
+use super::provenance::{self, NamedFile, ScanFiles};
+use super::provenance_date::MendDate;
 use crate::settings::{DeadlineArgs, NetworkArgs, SizeArgs, TextureArgs};
-use darn_contract::v1::{HoleReport, Report};
+use darn_contract::port::Mended;
+use darn_contract::v1::{FileDigests, HoleReport, Report};
 use darn_contract::{Constraints, FieldError, LAST_ALTERNATIVE, Outcome};
+use darn_gltf_scan::Scan;
 use darn_mend::{Call, MendError, NetworkMender};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -45,9 +48,9 @@ pub struct InpaintArgs {
     /// Where the provenance of the mend goes, as linked data (CRMdig and PREMIS in JSON-LD)
     #[arg(long, value_name = "FILE")]
     provenance: Option<PathBuf>,
-    /// When the mend is said to be, in the provenance; left out, it has no date
-    #[arg(long, requires = "provenance", value_parser = provenance::date)]
-    date: Option<String>,
+    /// When the mend is said to be, in the provenance: a day such as 2026-11-28, or an instant such as 2026-11-28T09:30:00Z; left out, it has no date
+    #[arg(long, requires = "provenance", value_parser = MendDate::parsed)]
+    date: Option<MendDate>,
     #[command(flatten)]
     size: SizeArgs,
     #[command(flatten)]
@@ -185,7 +188,14 @@ impl<'a> FileMender<'a> {
             files::write(path, &text)?;
         }
         if let Some(path) = &self.args.provenance {
-            write_provenance(path, self.args, &mended.report, &text)?;
+            let document = Provenance {
+                args: self.args,
+                scan: &read_scan,
+                mended: &mended,
+                packed: packed.as_deref(),
+                report_text: &text,
+            };
+            files::write(path, &document.text()?)?;
         }
         match packed {
             Some(packed) => files::write(output, &packed)?,
@@ -315,33 +325,73 @@ pub fn stage_line(stage: &str, started: Instant) -> serde_json::Value {
     serde_json::json!({"type": "stage", "stage": stage, "seconds": seconds})
 }
 
-/// Writes the provenance of a mend; `text` is its report as it was written.
-fn write_provenance(
-    path: &Path,
-    args: &InpaintArgs,
-    report: &Report,
-    text: &[u8],
-) -> Result<(), Failure> {
-    let name = |path: &Path| {
-        path.file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned()
-    };
-    let constraints = match &args.constraints {
-        Some(path) => files::read(path)?,
-        None => b"{}".to_vec(),
-    };
-    let log = args.report.as_deref().map(name);
-    let document = provenance::document(&provenance::Mend {
-        report,
-        input: &name(args.scan.as_deref().unwrap_or(Path::new(""))),
-        output: &name(&args.output),
-        constraints: &constraints,
-        log: log.as_deref().map(|log| (log, text)),
-        date: args.date.as_deref(),
-    });
-    files::write(path, &files::json(&document, "write the provenance")?)
+/// What the provenance of a mend is written from.
+struct Provenance<'a> {
+    args: &'a InpaintArgs,
+    scan: &'a Scan,
+    mended: &'a Mended,
+    /// The mended scan as one GLB, if it is written so.
+    packed: Option<&'a [u8]>,
+    /// The report as it is written.
+    report_text: &'a [u8],
+}
+
+impl Provenance<'_> {
+    /// The document's text.
+    fn text(&self) -> Result<Vec<u8>, Failure> {
+        let constraints = match &self.args.constraints {
+            Some(path) => files::read(path)?,
+            None => b"{}".to_vec(),
+        };
+        let report = &self.mended.report;
+        let scan_path = self.args.scan.as_deref().unwrap_or(Path::new(""));
+        let [input, output] = [scan_path, &self.args.output].map(file_name);
+        let input = NamedFile {
+            name: &input,
+            bytes: self.scan.received(),
+        };
+        let output = NamedFile {
+            name: &output,
+            bytes: self.packed.unwrap_or(&self.mended.bytes),
+        };
+        let log = self.args.report.as_deref().map(file_name);
+        let document = provenance::document(&provenance::Mend {
+            report,
+            input: self.with_parts(input, report.input.as_ref()),
+            output: match self.packed {
+                Some(_) => ScanFiles::alone(output),
+                None => self.with_parts(output, report.output.as_ref()),
+            },
+            constraints: &constraints,
+            log: log.as_deref().map(|name| NamedFile {
+                name,
+                bytes: self.report_text,
+            }),
+            date: self.args.date.as_ref(),
+        });
+        files::json(&document, "write the provenance")
+    }
+
+    /// A file of the scan's own container with what is in it or beside it; `digests` are those of a zip's glTF.
+    fn with_parts<'f>(
+        &'f self,
+        main: NamedFile<'f>,
+        digests: Option<&FileDigests>,
+    ) -> ScanFiles<'f> {
+        let siblings = self.scan.siblings();
+        ScanFiles {
+            main,
+            inner: self.scan.path_in_zip().zip(digests.cloned()),
+            beside: siblings
+                .map(|(name, bytes)| NamedFile { name, bytes })
+                .collect(),
+        }
+    }
+}
+
+fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
 }
 
 /// The constraints in a file; invalid ones are wrong usage.

@@ -25,6 +25,9 @@ mod openapi;
 mod optimize_anchor;
 mod progress;
 mod provenance;
+mod provenance_date;
+#[cfg(test)]
+mod provenance_tests;
 mod render;
 #[cfg(feature = "burn")]
 mod samples;

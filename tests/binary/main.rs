@@ -9,6 +9,7 @@ mod many;
 mod materials;
 #[path = "../../crates/jobs/tests/laws/postgres.rs"]
 mod postgres;
+mod provenance;
 mod running;
 #[cfg(target_os = "linux")]
 #[path = "../../crates/jobs/tests/laws/small_disk.rs"]

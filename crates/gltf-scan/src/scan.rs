@@ -108,6 +108,23 @@ impl Scan {
         }
     }
 
+    /// The bytes that it was read from: of a glTF, of a mesh file, or of a zip.
+    pub fn received(&self) -> &Bytes {
+        match (&self.origin, &self.companions) {
+            (Some(origin), _) => origin.bytes(),
+            (None, Companions::Zip(zip)) => &zip.bytes,
+            _ => &self.bytes,
+        }
+    }
+
+    /// Path of the glTF in the zip that it was read from.
+    pub fn path_in_zip(&self) -> Option<&str> {
+        match &self.companions {
+            Companions::Zip(zip) => Some(&zip.main),
+            Companions::Siblings(_) => None,
+        }
+    }
+
     /// The files that were read with the scan, by their paths relative to it. None of a zip.
     pub fn siblings(&self) -> impl Iterator<Item = (&str, &[u8])> {
         let files = match &self.companions {
