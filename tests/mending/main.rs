@@ -12,6 +12,8 @@ mod editing;
 #[path = "../../crates/gltf-scan/src/compressed/encoded.rs"]
 mod encoded;
 mod files;
+mod fixtures;
+mod image_formats;
 mod laws;
 mod mesh_files;
 mod patched;

@@ -111,6 +111,8 @@ pub struct Patched {
     pub bin: Vec<u8>,
     pub primitive: Value,
     pub report: v1::TextureReport,
+    /// The notes of the hole.
+    pub notes: Vec<String>,
 }
 
 impl Patched {
@@ -123,6 +125,7 @@ impl Patched {
             primitive: all.find(new).expect("a patch").clone(),
             bin: bin.to_vec(),
             report: mended.report.holes[0].texture.clone().expect("a texture"),
+            notes: mended.report.holes[0].notes.clone(),
             json,
         }
     }

@@ -35,6 +35,7 @@ pub(super) struct PatchKind {
     hatch: Option<usize>,
     both_sides: bool,
     normals: bool,
+    tangents: bool,
     texcoords: usize,
     /// Channels of each colour set.
     colors: Vec<usize>,
@@ -118,6 +119,7 @@ impl<'s> CheckedPatch<'s> {
             hatch: self.look.hatch,
             both_sides: self.patch.both_sides,
             normals: self.look.normals.is_some(),
+            tangents: !self.patch.tangents.is_empty(),
             texcoords: self.patch.texcoords.len(),
             colors: kinds.map(|kind| kind.multiplicity()).collect(),
             deviations: !self.patch.deviations.is_empty(),
@@ -144,11 +146,8 @@ impl<'s> CheckedPatch<'s> {
             .collect()
     }
 
-    /// Tangents in the node's space, at right angles to the normals; none unless a texture needs them.
+    /// Tangents in the node's space, at right angles to the normals.
     pub fn tangents(&self, normals: &[[f32; 3]]) -> Vec<[f32; 4]> {
-        let Some(own) = self.patch.appearance.own().filter(|own| own.has_normals()) else {
-            return Vec::new();
-        };
         let to_node = (self.home.transform.inverse())
             .map_or_else(nalgebra::Matrix3::identity, |inverse| inverse.linear);
         let handedness = if self.home.transform.mirrors() {
@@ -156,7 +155,7 @@ impl<'s> CheckedPatch<'s> {
         } else {
             1.0
         };
-        (own.tangents.iter().zip(normals))
+        (self.patch.tangents.iter().zip(normals))
             .map(|([x, y, z, w], normal)| {
                 let normal = Vec3::from(normal.map(f64::from));
                 let along = to_node * Vec3::from([*x, *y, *z].map(f64::from));
@@ -211,15 +210,20 @@ fn check_values(patch: &PatchPrimitive, look: &ScanPart) -> Result<(), String> {
     expect_count(patch.texcoords.len(), texcoords, "texture coordinate sets")?;
     expect_count(patch.colors.len(), colors, "colour sets")?;
     if let Some(own) = patch.appearance.own() {
-        expect_count(own.tangents.len(), n, "tangents")?;
         expect_count(own.layers.len(), own.look.layers.len(), "images")?;
         let texels = own.width as usize * own.height as usize;
         for layer in own.layers.iter() {
             expect_count(layer.len(), texels, "texels")?;
         }
-        if texels == 0 || !own.tangents.iter().flatten().all(|x| x.is_finite()) {
-            return Err("an image without texels, or a tangent that is not finite".into());
+        if texels == 0 {
+            return Err("an image without texels".into());
         }
+    }
+    if !patch.tangents.is_empty() {
+        expect_count(patch.tangents.len(), n, "tangents")?;
+    }
+    if !patch.tangents.iter().flatten().all(|x| x.is_finite()) {
+        return Err("a tangent is not finite".into());
     }
     if !patch.deviations.is_empty() {
         expect_count(patch.deviations.len(), n, "deviations")?;

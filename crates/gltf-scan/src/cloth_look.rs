@@ -6,7 +6,7 @@ use serde_json::{Map, Value};
 
 use super::append::extension_list;
 use super::scan::Scan;
-use super::texture_slots::{self, SLOTS, TextureKind};
+use super::texture_slots::{self, SLOTS, TextureKind, TextureSlot};
 use super::variants::{EXTENSION, MaterialChoices, VARIANTS, Variants, mapped_materials};
 
 /// Most layers of a patch: a scan may have many variants.
@@ -182,6 +182,22 @@ impl Scan {
         })
     }
 
+    /// Where a part's normal map takes its texture coordinates from, without a variant or, if only a variant has one, in the first that has: what
+    /// the directions of `TANGENT` belong to. Other maps of directions count as well. `None` if no material of the part has such a map.
+    pub fn normal_places(&self, part: usize) -> Option<TexturePlaces> {
+        let part = self.parts.get(part)?;
+        let mapped = mapped_materials(self, part).into_values();
+        let materials = part.material.into_iter().chain(mapped);
+        let is_directed =
+            |slot: &&TextureSlot| matches!(slot.kind, TextureKind::Normal | TextureKind::Direction);
+        let mut infos = materials.filter_map(|material| {
+            let object = self.json.get("materials")?.get(material)?.as_object()?;
+            let mut slots = SLOTS.iter().filter(is_directed);
+            slots.find_map(|slot| texture_slots::at(object, slot.path))
+        });
+        infos.next().map(TexturePlaces::of)
+    }
+
     /// The layers of one choice of materials; those that are not known yet are added.
     fn choice(
         &self,
@@ -261,17 +277,43 @@ impl Scan {
                 _ => TextureWrap::Repeat,
             }
         };
-        let moved = info.pointer("/extensions/KHR_texture_transform");
-        let set = moved.and_then(|it| it.get("texCoord"));
-        let set = set.or_else(|| info.get("texCoord")).and_then(number);
+        let places = TexturePlaces::of(info);
         Ok(TextureSource {
             image: Some(image),
-            texcoords: set.unwrap_or(0),
-            transform: moved.map_or(IDENTITY, transform),
+            texcoords: places.texcoords,
+            transform: places.transform,
             wrap: [wrap("wrapS"), wrap("wrapT")],
             factor,
             sampler,
         })
+    }
+}
+
+/// Where a texture takes its texture coordinates from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TexturePlaces {
+    /// The set of texture coordinates.
+    pub texcoords: usize,
+    /// `KHR_texture_transform`, as in [`TextureSource`].
+    pub transform: [[f32; 3]; 2],
+}
+
+impl TexturePlaces {
+    /// Of a texture info (glTF 2.0, 5.28).
+    fn of(info: &Value) -> Self {
+        let moved = info.pointer("/extensions/KHR_texture_transform");
+        let set = moved.and_then(|it| it.get("texCoord"));
+        let set = set.or_else(|| info.get("texCoord")).and_then(Value::as_u64);
+        let set = set.and_then(|set| usize::try_from(set).ok());
+        Self {
+            texcoords: set.unwrap_or(0),
+            transform: moved.map_or(IDENTITY, transform),
+        }
+    }
+
+    /// Texture coordinates as the image takes them.
+    pub fn place(&self, [u, v]: [f32; 2]) -> [f32; 2] {
+        self.transform.map(|[a, b, c]| a * u + b * v + c)
     }
 }
 

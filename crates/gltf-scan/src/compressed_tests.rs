@@ -117,6 +117,7 @@ fn a_patch_is_plain_and_the_compressed_bytes_stay() {
                 PatchPoint::New(Vec3::new(0.5, 0.5, 0.25)),
             ],
             normals: vec![Vec3::z(); 3],
+            tangents: Vec::new(),
             texcoords: vec![vec![[0.0; 2]; 3]],
             colors: Vec::new(),
             faces: vec![[0, 1, 2]],

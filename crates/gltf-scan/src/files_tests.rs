@@ -51,6 +51,7 @@ fn patch() -> PatchPrimitive {
             PatchPoint::New(Vec3::new(0.5, 0.5, 1.0)),
         ],
         normals: Vec::new(),
+        tangents: Vec::new(),
         texcoords: Vec::new(),
         colors: Vec::new(),
         faces: vec![[0, 1, 2]],

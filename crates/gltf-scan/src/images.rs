@@ -152,3 +152,56 @@ fn decode(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use base64::Engine as _;
+    use base64::engine::general_purpose::STANDARD;
+    use image::{DynamicImage, Rgb, RgbImage};
+    use serde_json::json;
+
+    use super::*;
+    use crate::testing::Builder;
+
+    const COLOUR: [u8; 3] = [200, 60, 40];
+    const SIDE: u32 = 8;
+    /// A picture in one colour as Chromium writes WebP with loss, without its colour profile.
+    const LOSSY_WEBP: &str = "UklGRjwAAABXRUJQVlA4IDAAAADwAQCdASoIAAgAAUAmJaACdLoB+AAEgwAA/u4KZ/5BcsLrka/9pZ+pZ+pZ/ioAAAA=";
+
+    fn encoded(format: ImageFormat) -> Vec<u8> {
+        let picture = DynamicImage::from(RgbImage::from_pixel(SIDE, SIDE, Rgb(COLOUR)));
+        let mut out = Cursor::new(Vec::new());
+        picture.write_to(&mut out, format).unwrap();
+        out.into_inner()
+    }
+
+    #[test]
+    fn png_jpeg_and_webp_with_and_without_loss_are_decoded() {
+        let lossy = STANDARD.decode(LOSSY_WEBP).unwrap();
+        let without_loss = encoded(ImageFormat::WebP);
+        assert_eq!(
+            (&lossy[12..16], &without_loss[12..16]),
+            (&b"VP8 "[..], &b"VP8L"[..])
+        );
+        for (name, bytes, off) in [
+            ("PNG", encoded(ImageFormat::Png), 0),
+            ("JPEG", encoded(ImageFormat::Jpeg), 8),
+            ("WebP", without_loss, 0),
+            ("lossy WebP", lossy, 8),
+        ] {
+            let mut scan = Builder::square();
+            let view = scan.view(&bytes);
+            scan.json["images"] = json!([{ "bufferView": view }]);
+            let limits = ScanLimits::default();
+            let scan = Scan::read(scan.glb(), &limits).unwrap();
+            let image = scan.image(0, &limits, Budget::unlimited()).unwrap();
+            assert_eq!((image.width, image.height), (SIDE, SIDE), "{name}");
+            let [red, green, blue] = COLOUR;
+            for texel in image.texels() {
+                for (found, given) in texel.iter().zip([red, green, blue, 255]) {
+                    assert!(found.abs_diff(given) <= off, "{name}: {texel:?}");
+                }
+            }
+        }
+    }
+}

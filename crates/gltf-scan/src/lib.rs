@@ -76,7 +76,7 @@ mod xmp_tests;
 mod zip_files;
 mod zip_undo;
 
-pub use cloth_look::{ClothLook, LookLayer, NoLook, TextureSource, TextureWrap};
+pub use cloth_look::{ClothLook, LookLayer, NoLook, TexturePlaces, TextureSource, TextureWrap};
 pub use container::Container;
 pub use content::SceneContent;
 pub use darn_mesh_files::MeshFileError;

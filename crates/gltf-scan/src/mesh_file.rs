@@ -347,6 +347,7 @@ mod tests {
             faces: vec![[1, 0, 2]],
             both_sides: false,
             normals: vec![Vec3::z(); 3],
+            tangents: Vec::new(),
             texcoords: vec![vec![[0.25, 0.75]; 3]; scan.parts[0].texcoords.len()],
             colors: Vec::new(),
             appearance: super::super::PatchAppearance::Continued,

@@ -36,8 +36,6 @@ pub struct OwnTexture {
     pub height: u32,
     /// Per layer of the look: `width` × `height` texels, row by row.
     pub layers: Arc<Vec<Vec<[u8; 4]>>>,
-    /// Per point of the patch: the direction of +u in scene space, and the handedness of the bitangent.
-    pub tangents: Vec<[f32; 4]>,
 }
 
 impl PatchAppearance {
@@ -71,7 +69,7 @@ impl OwnTexture {
     }
 
     /// Whether a material has a texture that needs tangents.
-    pub(super) fn has_normals(&self) -> bool {
+    pub fn has_normals(&self) -> bool {
         let mut layers = self.look.layers.iter();
         layers.any(|it| matches!(it.kind, TextureKind::Normal | TextureKind::Direction))
     }

@@ -243,7 +243,7 @@ impl<'s> PatchGroup<'s> {
         each.flatten().collect()
     }
 
-    /// Tangents of all patches' vertices; none unless a texture needs them.
+    /// Tangents of all patches' vertices; none where the patches have none.
     fn tangents(&self) -> Vec<[f32; 4]> {
         let each = self.patches().map(|patch| patch.tangents(&patch.normals()));
         each.flatten().collect()

@@ -174,7 +174,6 @@ mod tests {
             width,
             height,
             layers: Arc::new(vec![vec![[shade, 0, 0, 255]; (width * height) as usize]]),
-            tangents: Vec::new(),
         }
     }
 

@@ -25,6 +25,8 @@ pub struct PatchPrimitive {
     pub both_sides: bool,
     /// Normals in scene space, `[points.len()]`, of any length except zero; not read if the part has none.
     pub normals: Vec<Vec3>,
+    /// Per point the direction of +u in scene space and the handedness of the bitangent; empty unless a texture of its material needs them.
+    pub tangents: Vec<[f32; 4]>,
     /// Texture coordinate sets.
     pub texcoords: Vec<Vec<[f32; 2]>>,
     /// Colour sets, linear RGBA.

@@ -35,6 +35,7 @@ fn patch(scan: &Scan, part: usize, id: u32) -> PatchPrimitive {
             PatchPoint::New(Vec3::new(0.5, 0.5, 1.0 + f64::from(id))),
         ],
         normals: vec![Vec3::z(); 3],
+        tangents: Vec::new(),
         texcoords: vec![vec![[0.5; 2]; 3]; look.texcoords.len()],
         colors: vec![vec![[0.5; 4]; 3]; look.colors.len()],
         faces: vec![[0, 1, 2]],

@@ -172,6 +172,7 @@ pub(crate) fn tent(scan: &Scan, part: usize, top: Vec3) -> PatchPrimitive {
         both_sides: false,
         appearance: Default::default(),
         normals: vec![Vec3::new(0.0, 0.0, 3.0); 4],
+        tangents: Vec::new(),
         texcoords: vec![vec![[0.25, 0.5]; 4]; look.texcoords.len()],
         colors: vec![vec![[0.1, 0.2, 0.3, 0.4]; 4]; look.colors.len()],
         name: "hole 0".into(),

@@ -30,6 +30,7 @@ fn patch(scan: &Scan, part: usize) -> PatchPrimitive {
             PatchPoint::New(Vec3::new(0.5, 0.5, 1.0)),
         ],
         normals: vec![Vec3::z(); 3],
+        tangents: Vec::new(),
         texcoords: vec![vec![[0.25; 2]; 3]; look.texcoords.len()],
         colors: vec![vec![[0.5; 4]; 3]; look.colors.len()],
         faces: vec![[0, 1, 2]],

@@ -22,6 +22,7 @@ fn mended(bytes: &[u8]) -> (Vec<u8>, Value) {
             PatchPoint::New(Vec3::z()),
         ],
         normals: Vec::new(),
+        tangents: Vec::new(),
         texcoords: Vec::new(),
         colors: Vec::new(),
         faces: vec![[0, 1, 2]],

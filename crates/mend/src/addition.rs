@@ -170,6 +170,7 @@ impl PatchSource<'_> {
                 .iter()
                 .map(|c| normals[c.vertex as usize])
                 .collect(),
+            tangents: Vec::new(),
             texcoords: texcoords.collect(),
             colors: colors.collect(),
             deviations: at_corners(deviations, &dressed.corners),

@@ -68,6 +68,7 @@ mod testing;
 mod texture;
 mod texture_cloth;
 mod texture_images;
+mod texture_patch;
 mod timings;
 mod welded_scan;
 mod without_noise;

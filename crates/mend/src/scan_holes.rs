@@ -377,6 +377,7 @@ impl ScanHoles {
         for (hole, patch) in filled.holes.iter_mut().zip(patches) {
             primitives.push(patch.primitive);
             hole.report.texture = Some(patch.report);
+            hole.report.notes.extend(patch.note);
             if let Some(timings) = &mut hole.report.timings {
                 timings.texture = patch.texture_ms;
             }

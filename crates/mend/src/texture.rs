@@ -8,8 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use darn_contract::{TextureChoice, v1};
-use darn_geometry::mesh::Vec3;
-use darn_gltf_scan::{ClothLook, NoLook, OwnTexture, PatchAppearance, PatchPrimitive, ScanLimits};
+use darn_gltf_scan::{ClothLook, NoLook, PatchAppearance, PatchPrimitive, ScanLimits};
 use darn_texture::{
     Completion, PatchTexture, Settings, TextureError, estimated_bytes, mean_texels,
 };
@@ -22,6 +21,7 @@ use crate::laid_cloth::LaidCloth;
 use crate::prepared_hole::HoleRef;
 use crate::texture_cloth::TextureCloth;
 use crate::texture_images::ImageCache;
+use crate::texture_patch::{flat_colours, no_columns, with};
 use crate::timings::milliseconds;
 
 /// Why a patch has no images of its own where the request asks for none in particular.
@@ -34,6 +34,8 @@ pub struct ColouredPatch {
     pub primitive: PatchPrimitive,
     /// Where its colour comes from.
     pub report: v1::TextureReport,
+    /// What a person should know: why it has no images of its own where it should.
+    pub note: Option<String>,
     /// Milliseconds.
     pub texture_ms: f64,
 }
@@ -43,6 +45,7 @@ pub struct ColouredPatch {
 struct HoleTexture {
     style: TextureStyle,
     report: v1::TextureReport,
+    note: Option<String>,
 }
 
 #[derive(Debug)]
@@ -54,11 +57,15 @@ enum TextureStyle {
 
 /// A patch's own images, and the patch in the chart.
 #[derive(Debug)]
-struct OwnImages {
-    look: Arc<ClothLook>,
-    texture: PatchTexture,
-    layers: Arc<Vec<Vec<[u8; 4]>>>,
-    chart: darn_texture::PatchChart,
+pub struct OwnImages {
+    /// What the images are.
+    pub look: Arc<ClothLook>,
+    /// Their size, and the patch's places in them.
+    pub texture: PatchTexture,
+    /// Their texels, per layer.
+    pub layers: Arc<Vec<Vec<[u8; 4]>>>,
+    /// The patch in the chart.
+    pub chart: darn_texture::PatchChart,
 }
 
 /// The textures that a hole's patch was given, by what was asked for; they do not depend on its folds.
@@ -147,8 +154,7 @@ impl Colouring<'_> {
             let laid = tasks.par_iter().map(|task| {
                 let (started, dressed) = (Instant::now(), &dressed[task.index]);
                 let Some(laid) = LaidCloth::of(task.hole, dressed, &self.source)? else {
-                    let texture = continued(self.why(NO_CHART));
-                    task.hole.textures().keep(self.choice, texture);
+                    task.hole.textures().keep(self.choice, refused(NO_CHART));
                     return Ok(None);
                 };
                 let (scan, look) = (self.source.scan, &task.look);
@@ -167,11 +173,10 @@ impl Colouring<'_> {
         let all = filled.par_iter().zip(dressed).zip(times);
         let all = all.map(|((filled, dressed), texture_ms)| {
             let started = Instant::now();
-            let (primitive, report) = self.patch(filled, dressed);
+            let patch = self.patch(filled, dressed);
             ColouredPatch {
-                primitive,
-                report,
                 texture_ms: texture_ms + milliseconds(started),
+                ..patch
             }
         });
         Ok(all.collect())
@@ -234,7 +239,7 @@ impl Colouring<'_> {
             task, laid, bytes, ..
         } = laid;
         let completed = match bytes {
-            Ok(bytes) if bytes > left => Ok(continued(format!(
+            Ok(bytes) if bytes > left => Ok(refused(format!(
                 "a texture of its own would take {} MiB, more than the request has left",
                 bytes >> 20
             ))),
@@ -244,37 +249,31 @@ impl Colouring<'_> {
         let texture = match completed {
             Ok(texture) => texture,
             Err(TextureError::Exhausted(exhausted)) => return Err(exhausted.into()),
-            Err(reason) => continued(reason.to_string()),
+            Err(reason) => refused(reason.to_string()),
         };
         task.hole.textures().keep(self.choice, texture);
         Ok(())
     }
 
     /// A patch as it goes to the scan; its texture is made.
-    fn patch(
-        &self,
-        filled: &FilledHole,
-        dressed: DressedPatch,
-    ) -> (PatchPrimitive, v1::TextureReport) {
+    fn patch(&self, filled: &FilledHole, dressed: DressedPatch) -> ColouredPatch {
         if self.choice == Some(TextureChoice::None) {
             let (plain, _) = self
                 .source
                 .undivided(filled, &dressed, &no_columns(&dressed));
             let report = report_of("none", String::new());
-            return (with(plain, PatchAppearance::Plain), report);
+            return coloured(with(plain, PatchAppearance::Plain), report, None);
         }
         let Some(texture) = filled.hole.textures().get(self.choice) else {
-            return (
-                dressed.primitive,
-                report_of("continued", self.why(NO_CHART)),
-            );
+            let HoleTexture { report, note, .. } = refused(NO_CHART);
+            return coloured(self.source.continued(filled, dressed), report, note);
         };
         let primitive = match &texture.style {
             TextureStyle::Continued => match self.choice {
-                Some(TextureChoice::Flat) => flat_colours(dressed.primitive),
-                _ => dressed.primitive,
+                Some(TextureChoice::Flat) => flat_colours(self.source.continued(filled, dressed)),
+                _ => self.source.continued(filled, dressed),
             },
-            TextureStyle::Own(own) => self.own(filled, &dressed, own),
+            TextureStyle::Own(own) => self.source.in_own_images(filled, &dressed, own),
             TextureStyle::Flat(look, means) => {
                 let (flat, _) = self
                     .source
@@ -282,15 +281,7 @@ impl Colouring<'_> {
                 with(flat, PatchAppearance::Flat(Arc::clone(look), means.clone()))
             }
         };
-        (primitive, texture.report.clone())
-    }
-
-    /// A reason that the report gives unless the request asked for just that.
-    fn why(&self, reason: impl Into<String>) -> String {
-        match self.choice {
-            Some(TextureChoice::Continue) => String::new(),
-            _ => reason.into(),
-        }
+        coloured(primitive, texture.report.clone(), texture.note.clone())
     }
 
     /// How the cloth around a hole looks, with its images decoded; inside, what a patch gets where that cannot be told.
@@ -312,13 +303,17 @@ impl Colouring<'_> {
                 return Ok(Err(HoleTexture {
                     style: TextureStyle::Continued,
                     report: report_of("flat", String::new()),
+                    note: None,
                 }));
             }
-            Err(reason) => return Ok(Err(continued(reason.to_string()))),
+            Err(NoLook::NoTexture) => {
+                return Ok(Err(continued(NoLook::NoTexture.to_string())));
+            }
+            Err(reason) => return Ok(Err(refused(reason.to_string()))),
         };
         for image in look.images() {
             if let Err(reason) = images.decode(image, &self.source, self.scan_limits)? {
-                return Ok(Err(continued(reason)));
+                return Ok(Err(refused(reason)));
             }
         }
         Ok(Ok(look))
@@ -341,6 +336,7 @@ impl Colouring<'_> {
             return Ok(HoleTexture {
                 style: TextureStyle::Flat(Arc::clone(look), means),
                 report: report_of("flat", String::new()),
+                note: None,
             });
         }
         let completion = Completion::new(cloth, patch, settings, budget)?;
@@ -356,6 +352,7 @@ impl Colouring<'_> {
             return Ok(HoleTexture {
                 style: TextureStyle::Continued,
                 report: compared(report_of("continued", reason.to_owned())),
+                note: None,
             });
         }
         let mut texture = completion.texture(budget)?;
@@ -381,35 +378,8 @@ impl Colouring<'_> {
         Ok(HoleTexture {
             style: TextureStyle::Own(own),
             report,
+            note: None,
         })
-    }
-
-    /// The patch in its own images.
-    fn own(&self, filled: &FilledHole, dressed: &DressedPatch, own: &OwnImages) -> PatchPrimitive {
-        let points =
-            |of: &[Vec3]| -> Vec<[f64; 3]> { of.iter().map(|p| [p.x, p.y, p.z]).collect() };
-        let positions = points(&filled.patch.positions);
-        let tangents = darn_texture::tangents(&own.chart, &positions, &points(&dressed.normals));
-        let columns: Vec<Vec<f64>> = (own.texture.texcoords.iter().zip(&tangents))
-            .map(|(place, tangent)| place.iter().chain(tangent).map(|x| f64::from(*x)).collect())
-            .collect();
-        let (primitive, columns) = self.source.undivided(filled, dressed, &columns);
-        let number = |row: &Vec<f64>, k: usize| row.get(k).copied().unwrap_or_default() as f32;
-        let places = columns.iter().map(|row| [0, 1].map(|k| number(row, k)));
-        let tangents = columns
-            .iter()
-            .map(|row| [2, 3, 4, 5].map(|k| number(row, k)));
-        let appearance = OwnTexture {
-            look: Arc::clone(&own.look),
-            width: own.texture.width,
-            height: own.texture.height,
-            layers: Arc::clone(&own.layers),
-            tangents: tangents.collect(),
-        };
-        PatchPrimitive {
-            texcoords: vec![places.collect()],
-            ..with(primitive, PatchAppearance::Own(appearance))
-        }
     }
 }
 
@@ -418,31 +388,33 @@ fn continued(reason: String) -> HoleTexture {
     HoleTexture {
         style: TextureStyle::Continued,
         report: report_of("continued", reason),
+        note: None,
     }
 }
 
-fn with(primitive: PatchPrimitive, appearance: PatchAppearance) -> PatchPrimitive {
-    PatchPrimitive {
-        appearance,
-        ..primitive
+/// The same where the patch should look otherwise, but cannot.
+fn refused(reason: impl Into<String>) -> HoleTexture {
+    let reason = reason.into();
+    HoleTexture {
+        note: Some(format!(
+            "the new cloth continues the scan's texture coordinates, which may show other places of its images: {reason}"
+        )),
+        ..continued(reason)
     }
 }
 
-fn no_columns(dressed: &DressedPatch) -> Vec<Vec<f64>> {
-    vec![Vec::new(); dressed.normals.len()]
-}
-
-/// A patch with the mean of its colours at every vertex.
-fn flat_colours(mut primitive: PatchPrimitive) -> PatchPrimitive {
-    for set in &mut primitive.colors {
-        let count = set.len().max(1) as f64;
-        let mean = [0, 1, 2, 3].map(|k: usize| {
-            let sum: f64 = set.iter().map(|colour| f64::from(colour[k])).sum();
-            (sum / count) as f32
-        });
-        set.fill(mean);
+/// A patch whose texture was no work.
+fn coloured(
+    primitive: PatchPrimitive,
+    report: v1::TextureReport,
+    note: Option<String>,
+) -> ColouredPatch {
+    ColouredPatch {
+        primitive,
+        report,
+        note,
+        texture_ms: 0.0,
     }
-    primitive
 }
 
 fn report_of(method: &str, reason: String) -> v1::TextureReport {
