@@ -14,6 +14,7 @@ use super::json::JsonPlace;
 use super::limits::ScanLimits;
 use super::mesh_file::mesh_container;
 use super::scan::Scan;
+use super::undo;
 use super::zip_files::ZipFiles;
 
 impl Scan {
@@ -76,6 +77,7 @@ fn packed(
     allowance: &DecodeAllowance<'_>,
 ) -> Result<Vec<u8>, ScanError> {
     let mut json = json_of_text(gltf)?;
+    undo::mark_packed(&mut json);
     let mut bin = Vec::new();
     let places = merge_buffers(&mut json, &mut bin, companions, allowance)?;
     for view in list(&mut json, "bufferViews") {

@@ -16,7 +16,7 @@ use super::error::ScanError;
 use super::limits::ScanLimits;
 use super::mesh_file::stripped_mesh_file;
 use super::read::parsed_json;
-use super::undo::{Undone, undone};
+use super::undo::{Undone, packed_from, undone};
 use super::unmarked::{Marks, without_marks};
 use super::zip_files::{self, ZipFiles};
 
@@ -93,6 +93,7 @@ fn stripped_file(
         }
     }
     let mut json = json_of(&bytes, limits, budget)?;
+    notes.extend(packed_from(&json).map(packed_note));
     let left = without_marks(&mut json);
     if left.is_none() && mends == 0 {
         return Ok(None);
@@ -124,6 +125,14 @@ const CHANGED: &str = "the scan was changed after darn mended it, so that its by
      taken out of what it is now";
 const NO_RECORD: &str = "the scan has no record of its bytes from before: another version of darn mended it, or other software wrote it \
      anew; darn's patches were taken out of what it is now";
+/// What a person should know of a GLB that darn packed of a glTF with this SHA-256 and its files.
+fn packed_note(sha256: &str) -> String {
+    format!(
+        "darn packed this GLB of a mended glTF and its files; the glTF from before the mend, whose SHA-256 is {sha256}, cannot be made from it; darn's \
+         patches were taken out of the GLB"
+    )
+}
+
 const PACKED_ANEW: &str = "the zip was packed by others; the glTF in it is the one from before, and the other files are as they came";
 
 fn stripped_zip(

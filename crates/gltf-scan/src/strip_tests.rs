@@ -402,6 +402,36 @@ fn a_zip_that_others_packed_again_keeps_its_gltf_exact() {
 }
 
 #[test]
+fn a_gltf_that_darn_packed_is_told_by_its_digest_and_loses_its_patches() {
+    let mend = Mend {
+        patches: 1,
+        cuts: false,
+    };
+    for form in [Form::DataUri, Form::Separate, Form::Zip(true)] {
+        let (before, siblings) = scan_of(form, PLAIN);
+        let gltf = read(&before, &siblings).digests().sha256.clone();
+        let twice = mended(&mended(&before, &siblings, mend), &siblings, mend);
+        let packed = read(&before, &siblings).packed(&twice).unwrap();
+        // A GLB of darn's is mended as any other; what was packed before stays so.
+        let again = mended(&packed, &Siblings::default(), mend);
+        for (bytes, undone) in [(&packed, 0), (&again, 1)] {
+            let stripped = strip(bytes).unwrap();
+            assert_eq!((stripped.exact, stripped.mends), (false, undone));
+            assert_eq!(stripped.marks.patches, 2 + undone);
+            assert_eq!(stripped.notes.len(), 1, "{:?}", stripped.notes);
+            let note = &stripped.notes[0];
+            assert!(note.contains("packed") && note.contains(&gltf), "{note}");
+            let untouched = read(&before, &siblings);
+            let expected: Vec<_> = (0..untouched.surface.faces.len())
+                .map(|f| untouched.surface.triangle(f))
+                .collect();
+            assert_eq!(triangles(&stripped.bytes), expected);
+            assert!(strip(&stripped.bytes).is_none(), "nothing is left to strip");
+        }
+    }
+}
+
+#[test]
 fn a_record_is_small() {
     let (before, none) = scan_of(Form::Glb, PLAIN);
     let mend = Mend {

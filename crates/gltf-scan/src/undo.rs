@@ -11,6 +11,9 @@
 //!
 //! All else that a file had is in the file it was mended to: its other bytes, chunks and trailing bytes. A file that was
 //! mended several times has a record of each time, and the last one is undone first.
+//!
+//! Records do not hold for a glTF that darn packs with its files into a GLB: every index and offset is another there. `extras.darn.packed`
+//! takes the place of the first one and keeps the `sha256` of the glTF from before the first mend.
 
 use serde_json::{Value, json};
 
@@ -166,6 +169,34 @@ fn file_before(
     let mut before = container::glb_of_chunks(&json, bin, bytes.get(layout.rest.clone())?)?;
     before.extend_from_slice(bytes.get(layout.trailing.clone())?);
     Some(before)
+}
+
+/// Replaces the records of a glTF that is packed by the mark that says so.
+pub(super) fn mark_packed(json: &mut Value) {
+    let views = json.get_mut("bufferViews").and_then(Value::as_array_mut);
+    let views = views.into_iter().flatten();
+    let records = views.filter_map(|view| view.pointer_mut("/extras/darn")?.as_object_mut());
+    let mut is_first = true;
+    for darn in records {
+        let Some(record) = darn.shift_remove("undo") else {
+            continue;
+        };
+        if is_first {
+            darn.insert("packed".into(), json!({ "sha256": record.get("sha256") }));
+        }
+        is_first = false;
+    }
+}
+
+/// The SHA-256 that the mark of a packed glTF keeps.
+pub(super) fn packed_from(json: &Value) -> Option<&str> {
+    let views = json.get("bufferViews")?.as_array()?;
+    let mut marks = views
+        .iter()
+        .filter_map(|view| view.pointer("/extras/darn/packed/sha256"));
+    let digest = marks.next()?.as_str()?;
+    let is_digest = digest.len() == 64 && digest.bytes().all(|byte| byte.is_ascii_hexdigit());
+    is_digest.then_some(digest)
 }
 
 fn number(value: &Value) -> Option<usize> {

@@ -200,22 +200,25 @@ fn remove_member(object: &mut Map<String, Value>, key: &str) {
     }
 }
 
-/// Removes the records of mends that do not fit any more.
+/// Removes the records of mends that do not fit any more, and the mark of a packed glTF.
 fn remove_records(json: &mut Value) -> bool {
     let mut found = false;
     for view in list(json, "bufferViews") {
-        if view.pointer("/extras/darn/undo").is_some() {
-            found = true;
-            if let Some(view) = view.as_object_mut() {
-                remove_member(view, "undo");
+        for key in ["undo", "packed"] {
+            if view.pointer(&format!("/extras/darn/{key}")).is_some()
+                && let Some(view) = view.as_object_mut()
+            {
+                found = true;
+                remove_member(view, key);
             }
         }
     }
     found
 }
 
-/// Removes darn's variants from the end of the list, as far as no primitive maps them.
+/// Removes darn's variants from the end of the list, as far as no primitive maps them otherwise than darn does.
 fn remove_variants(json: &mut Value) {
+    remove_mappings(json);
     let mut mapped = BTreeSet::new();
     let mut is_used = false;
     for (_, primitive) in primitives(json) {
