@@ -26,6 +26,8 @@ pub(super) struct Appender<'s> {
     extensions: BTreeMap<(&'static str, &'static str), Vec<Value>>,
     /// Members to set in what is there: their paths and values.
     members: Vec<(Vec<String>, Value)>,
+    /// New elements of arrays by the arrays' paths.
+    items: Vec<(Vec<String>, Value)>,
     /// The buffer that takes the new bytes.
     buffer: usize,
     /// How many bytes that buffer has before them.
@@ -102,6 +104,7 @@ impl<'s> Appender<'s> {
             primitives: BTreeMap::new(),
             extensions: BTreeMap::new(),
             members: Vec::new(),
+            items: Vec::new(),
             buffer,
             start,
             in_bin,
@@ -158,6 +161,11 @@ impl<'s> Appender<'s> {
     /// Sets a member of an object that is there.
     pub fn set(&mut self, path: Vec<String>, value: Value) {
         self.members.push((path, value));
+    }
+
+    /// Appends to an array that is there.
+    pub fn append_at(&mut self, path: Vec<String>, value: Value) {
+        self.items.push((path, value));
     }
 
     /// Sets the extras of the element that was appended last to a list.
@@ -230,6 +238,10 @@ impl<'s> Appender<'s> {
         for (path, value) in &self.members {
             let path: Vec<&str> = path.iter().map(String::as_str).collect();
             edit.set(&path, value)?;
+        }
+        for (path, value) in &self.items {
+            let path: Vec<&str> = path.iter().map(String::as_str).collect();
+            edit.append(&path, std::slice::from_ref(value))?;
         }
         self.extend_extensions(&mut edit)?;
         for (mesh, primitives) in &self.primitives {

@@ -111,13 +111,13 @@ impl Scan {
     /// The bytes that it was read from: of a glTF, of a mesh file, or of a zip.
     pub fn received(&self) -> &Bytes {
         match (&self.origin, &self.companions) {
+            (_, Companions::Zip(zip)) => &zip.bytes,
             (Some(origin), _) => origin.bytes(),
-            (None, Companions::Zip(zip)) => &zip.bytes,
             _ => &self.bytes,
         }
     }
 
-    /// Path of the glTF in the zip that it was read from.
+    /// Name of the scan in the zip that it was read from.
     pub fn path_in_zip(&self) -> Option<&str> {
         match &self.companions {
             Companions::Zip(zip) => Some(&zip.main),

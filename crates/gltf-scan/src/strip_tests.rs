@@ -332,6 +332,34 @@ fn patches_of_a_scan_that_others_changed_are_taken_out_of_what_it_is_now() {
 }
 
 #[test]
+fn variants_of_the_scan_stay_when_patches_are_taken_out() {
+    let mut scan = builder(0);
+    let variants = json!({"variants": [{"name": "red"}, {"name": "blue"}]});
+    scan.push("materials", json!({"name": "blue"}));
+    scan.json["extensionsUsed"] = json!(["KHR_materials_variants"]);
+    scan.json["extensions"] = json!({ "KHR_materials_variants": variants });
+    let mappings = json!([{ "material": 0, "variants": [0] }, { "material": 1, "variants": [1] }]);
+    scan.json["meshes"][0]["primitives"][0]["extensions"] =
+        json!({"KHR_materials_variants": { "mappings": mappings }});
+    let (before, none) = (scan.glb(), Siblings::default());
+    let mend = Mend {
+        patches: 1,
+        cuts: false,
+    };
+    let twice = mended(&mended(&before, &none, mend), &none, mend);
+    let exact = strip(&twice).unwrap();
+    assert!(exact.exact && exact.bytes == before);
+    let changed = edited(&twice, |json| json["asset"]["generator"] = json!("Blender"));
+    let stripped = strip(&changed).unwrap();
+    assert!(!stripped.exact);
+    let layout = super::container::layout(&stripped.bytes).unwrap();
+    let json: Value = serde_json::from_slice(&stripped.bytes[layout.json]).unwrap();
+    assert_eq!(json["extensions"]["KHR_materials_variants"], variants);
+    let own = &json["meshes"][0]["primitives"][0]["extensions"]["KHR_materials_variants"];
+    assert_eq!(own["mappings"], mappings);
+}
+
+#[test]
 fn a_cut_whose_triangles_are_gone_stays_and_is_told() {
     let (before, none) = scan_of(Form::Glb, PLAIN);
     let cut = Mend {

@@ -248,6 +248,46 @@ fn remove_variants(json: &mut Value) {
     }
 }
 
+/// Removes the mappings of darn's variants alone that give primitives the material that they have without.
+fn remove_mappings(json: &mut Value) {
+    let names = json.pointer(&format!(
+        "/extensions/{}/{}",
+        variants::EXTENSION,
+        variants::VARIANTS
+    ));
+    let names = names.and_then(Value::as_array);
+    let own: BTreeSet<u64> = (0..)
+        .zip(names.into_iter().flatten())
+        .filter(|(_, variant)| {
+            let name = variant.get("name").and_then(Value::as_str);
+            name.is_some_and(|name| [variants::BLENDED, variants::MARKED].contains(&name))
+        })
+        .map(|(index, _)| index)
+        .collect();
+    let pointer = format!("/extensions/{}/mappings", variants::EXTENSION);
+    let meshes = list(json, "meshes").iter_mut();
+    let primitives = meshes.filter_map(|mesh| mesh.get_mut("primitives")?.as_array_mut());
+    for primitive in primitives.flatten() {
+        let material = primitive.get("material").cloned();
+        let mappings = primitive
+            .pointer_mut(&pointer)
+            .and_then(Value::as_array_mut);
+        let Some(mappings) = mappings else {
+            continue;
+        };
+        mappings.retain(|mapping| {
+            let variants = mapping.get("variants").and_then(Value::as_array);
+            let is_own = variants.is_some_and(|all| {
+                !all.is_empty()
+                    && all
+                        .iter()
+                        .all(|it| it.as_u64().is_some_and(|it| own.contains(&it)))
+            });
+            !is_own || mapping.get("material") != material.as_ref()
+        });
+    }
+}
+
 /// Removes darn's packets of metadata from the end of the list, as far as nothing else refers to them.
 fn remove_packets(json: &mut Value) {
     let packets = json.pointer(&format!("/extensions/{}/{}", xmp::EXTENSION, xmp::PACKETS));

@@ -1,7 +1,8 @@
 //! `KHR_materials_variants`: looks of a scan that a viewer's user chooses among.
 //!
 //! darn adds two: in one the patches look like the cloth, in the other they are hatched. Both are mapped on every patch, as
-//! are all variants that the scan has: some viewers (Voyager) leave a primitive as it is when a variant maps nothing on it.
+//! are all variants that the scan has, and darn's on primitives of the cloth that map others: some viewers (Voyager, model-viewer) leave a primitive as it
+//! is when a variant maps nothing on it.
 
 use std::collections::BTreeMap;
 
@@ -10,6 +11,7 @@ use serde_json::{Value, json};
 
 use super::append::{Appender, extension_list};
 use super::error::ScanError;
+use super::patch_primitive::is_reconstructed;
 use super::scan::{Scan, ScanPart};
 
 /// Name of the extension.
@@ -100,6 +102,50 @@ impl Variants {
         }
     }
 
+    /// Maps darn's variants on the cloth's own primitives that map others, each with the material that it has without a variant. glTF says as much, but
+    /// model-viewer and Voyager leave a primitive in the variant before where a new one maps nothing on it.
+    ///
+    /// # Errors
+    /// `Exhausted`.
+    pub fn map_on_cloth(
+        &self,
+        scan: &Scan,
+        out: &mut Appender<'_>,
+        budget: &Budget<'_>,
+    ) -> Result<(), ScanError> {
+        for (mesh, object) in list(&scan.json, "meshes").iter().enumerate() {
+            for (index, primitive) in list(object, "primitives").iter().enumerate() {
+                let material = primitive.get("material").and_then(Value::as_u64);
+                let mappings = primitive.pointer(&format!("/extensions/{EXTENSION}/mappings"));
+                let (Some(material), Some(mappings)) =
+                    (material, mappings.and_then(Value::as_array))
+                else {
+                    continue;
+                };
+                let mapped = mappings.iter().flat_map(|it| list(it, "variants"));
+                let mapped: Vec<&Value> = mapped.collect();
+                let own = [self.blended, self.marked].map(Value::from);
+                let new: Vec<&Value> = own.iter().filter(|it| !mapped.contains(it)).collect();
+                if mapped.is_empty() || new.is_empty() || is_reconstructed(primitive.get("extras"))
+                {
+                    continue;
+                }
+                budget.hold(VARIANT)?;
+                budget.spend(VARIANT_WORK)?;
+                let path = [
+                    "meshes",
+                    &format!("{mesh}"),
+                    "primitives",
+                    &format!("{index}"),
+                ];
+                let path = path.iter().chain(&["extensions", EXTENSION, "mappings"]);
+                let mapping = json!({ "material": material, "variants": new });
+                out.append_at(path.map(|key| (*key).to_owned()).collect(), mapping);
+            }
+        }
+        Ok(())
+    }
+
     /// The materials of a part of the scan.
     pub fn choices(&self, scan: &Scan, part: &ScanPart) -> MaterialChoices {
         let mut mapped = mapped_materials(scan, part);
@@ -137,6 +183,12 @@ impl Variants {
         });
         Ok(json!({ EXTENSION: { "mappings": mappings.collect::<Vec<_>>() } }))
     }
+}
+
+/// An array of an object; empty where there is none.
+fn list<'j>(of: &'j Value, key: &str) -> &'j [Value] {
+    let list = of.get(key).and_then(Value::as_array);
+    list.map_or(&[], Vec::as_slice)
 }
 
 /// The material that each variant maps on a part, by the variant's index; where several mappings name one variant, the first.

@@ -130,6 +130,10 @@ fn a_patch_changes_with_the_variants_of_the_cloth() {
     ] {
         assert_eq!(material(&json, 1, variant)["name"], name, "{variant}");
     }
+    // Where the cloth maps variants, darn's are those without one.
+    for (variant, name) in [("blue", "blue"), (BLENDED, "cloth"), (MARKED, "cloth")] {
+        assert_eq!(material(&json, 0, variant)["name"], name, "{variant}");
+    }
     let blue = material(&json, 1, "blue");
     assert!(blue["extensions"].get("KHR_materials_unlit").is_some());
     assert_eq!(blue["extras"]["darn"]["reconstructed"], true);

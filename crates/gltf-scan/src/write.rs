@@ -55,13 +55,8 @@ impl Scan {
     ) -> Result<WrittenScan, ScanError> {
         budget.spend(DIGEST_WORK * self.bytes.len() as u64)?;
         if patches.is_empty() && self.cut.is_empty() {
-            let bytes = match (&self.origin, &self.companions) {
-                (_, Companions::Zip(zip)) => &zip.bytes,
-                (Some(origin), _) => origin.bytes(),
-                _ => &self.bytes,
-            };
             return Ok(WrittenScan {
-                bytes: bytes.to_vec(),
+                bytes: self.received().to_vec(),
                 digests: self.digests().clone(),
             });
         }
@@ -111,6 +106,7 @@ impl Scan {
         }
         if let (Some(variants), false) = (&variants, patches.is_empty()) {
             variants.append(&mut out);
+            variants.map_on_cloth(self, &mut out, budget)?;
         }
         budget.check_output(self.bytes.len() + out.appended_bytes())?;
         let mended = out.finish()?;
