@@ -20,4 +20,5 @@ mod patched;
 mod ragged;
 mod requests;
 mod rims;
+mod stripped;
 mod tubes;

@@ -10,7 +10,7 @@ use darn_mend::strip;
 use super::cloth::{MendedScan, ROUND, holed, mended, packed, sheet};
 
 /// A mesh as OBJ: with materials, texture coordinates and normals, in a file as exporters write it.
-fn obj(mesh: &TriMesh) -> Vec<u8> {
+pub fn obj(mesh: &TriMesh) -> Vec<u8> {
     let mut text = String::from("# exported\r\nmtllib cloth.mtl\r\no cloth\r\nusemtl linen\r\n");
     for p in &mesh.positions {
         text += &format!("v {} {} {}\r\n", p.x as f32, p.y as f32, p.z as f32);
@@ -24,7 +24,7 @@ fn obj(mesh: &TriMesh) -> Vec<u8> {
 }
 
 /// A mesh as binary PLY with a property that darn does not know.
-fn ply(mesh: &TriMesh) -> Vec<u8> {
+pub fn ply(mesh: &TriMesh) -> Vec<u8> {
     let header = format!(
         "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
          property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float confidence\nelement face {}\n\
