@@ -11,6 +11,7 @@ const { fillInWords, onlyFillInWords } = await load('model/fills.ts');
 const { Editor } = await load('model/editor.ts');
 const { locate, positionOf, normalOf } = await load('model/cloth.ts');
 const { scanOf } = await load('model/scan_files.ts');
+const { withLook } = await load('model/saved_look.ts');
 
 /** A promise and what settles it. */
 function deferred() {
@@ -365,4 +366,32 @@ test('lines of an answer are handed on as they come, however they are cut', asyn
   } finally {
     globalThis.fetch = real;
   }
+});
+
+test('a look is given to all new cloth, also to that of an earlier mend, and to nothing else', async () => {
+  const KEY = 'KHR_materials_variants';
+  const patch = (material) => ({
+    material,
+    extensions: {
+      [KEY]: {
+        mappings: [
+          { material: 1, variants: [0, 1] },
+          { material: 2, variants: [2] },
+        ],
+      },
+    },
+  });
+  const document = (...materials) => ({
+    extensions: {
+      [KEY]: { variants: ['red', 'Reconstruction blended', 'Reconstruction marked'].map((name) => ({ name })) },
+    },
+    meshes: [{ primitives: [{ material: 0 }] }, { primitives: materials.map(patch) }],
+  });
+  const blob = (json) => new Blob([JSON.stringify(json)], { type: 'model/gltf+json' });
+  const looks = async (json, look) => JSON.parse(await (await withLook(blob(json), look)).text());
+  assert.deepEqual(await looks(document(1, 2), 'marked'), document(2, 2));
+  assert.deepEqual(await looks(document(1, 2), 'blended'), document(1, 1));
+  const [blended, mesh] = [blob(document(1, 1)), new Blob(['ply'], { type: 'model/ply' })];
+  assert.equal(await withLook(blended, 'blended'), blended, 'what has the look stays as it is');
+  assert.equal(await withLook(mesh, 'marked'), mesh);
 });

@@ -22,30 +22,35 @@ interface VariantDocument {
   }[];
 }
 
-/** A saved scan, as a GLB or a glTF, with one of the looks; the service saves it blended. */
+/** A saved scan, as a GLB or a glTF, with one of the looks; itself where it has that already, as the service blends what it mends. */
 export async function withLook(scan: Blob, look: SavedLook): Promise<Blob> {
-  if (look === 'blended' || !scan.type.startsWith('model/gltf')) {
+  if (!scan.type.startsWith('model/gltf')) {
     return scan;
   }
   const bytes = await scan.arrayBuffer();
   const json = isGlb(bytes) ? jsonOfGlb(bytes) : new Uint8Array(bytes);
-  const text = JSON.stringify(withMaterials(JSON.parse(new TextDecoder().decode(json)) as VariantDocument, look));
-  const { type } = scan;
+  const document = JSON.parse(new TextDecoder().decode(json)) as VariantDocument;
+  if (!changeMaterials(document, look)) {
+    return scan;
+  }
+  const [text, { type }] = [JSON.stringify(document), scan];
   return isGlb(bytes) ? glbOf(text, bytes.slice(GLB_HEADER + json.byteLength), type) : new Blob([text], { type });
 }
 
-/** Gives every primitive for which the look's variant has a material that material. */
-function withMaterials(document: VariantDocument, look: SavedLook): VariantDocument {
+/** Gives every primitive for which the look's variant has a material that material. Whether one had another. */
+function changeMaterials(document: VariantDocument, look: SavedLook): boolean {
   const name = SAVED_LOOKS.find(([it]) => it === look)?.[1];
   const variant = document.extensions?.[EXTENSION]?.variants?.findIndex((it) => it.name === name) ?? -1;
+  let hasChanged = false;
   for (const primitive of document.meshes?.flatMap(({ primitives = [] }) => primitives) ?? []) {
     const mappings = primitive.extensions?.[EXTENSION]?.mappings ?? [];
     const material = mappings.find(({ variants = [] }) => variants.includes(variant))?.material;
-    if (material !== undefined) {
+    if (material !== undefined && material !== primitive.material) {
       primitive.material = material;
+      hasChanged = true;
     }
   }
-  return document;
+  return hasChanged;
 }
 
 /** A GLB of a JSON and the chunks that follow it. */
