@@ -68,10 +68,7 @@ inEditor(
     await load({ ...shared, weights: 'silk' });
     await page.getByRole('alert').getByText(/silk/).waitFor();
 
-    await page
-      .getByRole('checkbox', { name: /Choose Hole/ })
-      .nth(0)
-      .uncheck();
+    await page.getByRole('checkbox', { name: `Choose Hole ${ids[0]}`, exact: true }).uncheck();
     await editor.button('Mend 1 hole').click();
     await editor.idle();
     const { holes, weights, minDiameter } = JSON.parse(await editor.model((it) => it.constraintsText()));
@@ -171,7 +168,8 @@ inEditor(
     assert.ok(Math.abs(wider.radius / hovered.radius - 1.1) < 1e-3, 'the wheel changes it before a drag');
     await page.mouse.down();
     await editor.idle();
-    assert.deepEqual(await page.evaluate(twistMarks), wider, 'a press keeps it');
+    const pressed = await page.evaluate(twistMarks);
+    assert.ok(Math.abs(pressed.radius / wider.radius - 1) < 1e-5 && pressed.hasDisk, 'a press keeps it');
     assert.equal(await editor.model((it) => it.draft), undefined);
     await page.mouse.up();
     const aside = await page.locator('aside').boundingBox();
@@ -205,7 +203,7 @@ inEditor('the camera turns, moves and zooms by keys on the picture, whatever the
   const turned = await after('ArrowLeft', 'ArrowUp');
   await editor.idle();
   assert.ok((await editor.difference(still, await editor.picture())) > 0.01, 'the picture follows');
-  assert.deepEqual(turned.target, start.target);
+  assert.ok(apart(turned.target, start.target) < 1e-9 * start.distance);
   assert.ok(apart(turned.position, start.position) > 0.05 * start.distance);
   assert.ok(Math.abs(turned.distance / start.distance - 1) < 1e-9);
   const back = await after('ArrowRight', 'ArrowDown');
