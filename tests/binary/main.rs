@@ -1,7 +1,7 @@
 //! The binary as a user meets it: `darn serve` on a real socket, and the commands beside it.
 
-mod files;
 mod cook;
+mod files;
 #[cfg(target_os = "linux")]
 mod full_disk;
 mod kills;
