@@ -18,6 +18,7 @@ mod healthcheck;
 mod holes;
 mod inpaint;
 mod key;
+mod mend_summary;
 #[cfg(feature = "burn")]
 mod mended;
 mod network;
