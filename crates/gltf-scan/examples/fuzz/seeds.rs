@@ -257,6 +257,7 @@ fn patch(scan: &Scan) -> PatchPrimitive {
             PatchPoint::New(Vec3::new(0.5, 0.5, 1.0)),
         ],
         normals: vec![Vec3::z(); 3],
+        tangents: Vec::new(),
         texcoords: vec![vec![[0.25, 0.5]; 3]; part.texcoords.len()],
         colors: vec![vec![[0.1, 0.2, 0.3, 0.4]; 3]; part.colors.len()],
         faces: vec![[0, 1, 2]],
