@@ -403,7 +403,7 @@ fn refused(reason: impl Into<String>) -> HoleTexture {
     }
 }
 
-/// A patch whose texture was no work.
+/// A patch, without the time that its texture took.
 fn coloured(
     primitive: PatchPrimitive,
     report: v1::TextureReport,
