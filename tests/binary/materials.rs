@@ -104,6 +104,8 @@ async fn an_obj_with_materials_is_taken_in_parts_and_in_a_zip() {
     let part = |bytes: &[u8]| Part::bytes(bytes.to_vec());
     let form = || {
         Form::new()
+            // Names as browsers and curl write them.
+            .percent_encode_noop()
             .part("scan", part(obj().as_bytes()))
             .part("my cloth.mtl", part(MTL.as_bytes()))
             .part("maps/my linen.png", part(PICTURE))
