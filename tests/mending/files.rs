@@ -1,9 +1,9 @@
 //! What files hold beside the cloth of a scene, and cloth that they store in odd ways.
 
 use darn_budget::Budget;
-use darn_contract::{Constraints, HoleSelector};
+use darn_contract::Constraints;
+use darn_geometry::mesh::Vec3;
 use darn_geometry::mesh::shapes::{holed_sheet, sheet};
-use darn_geometry::mesh::{TriMesh, Vec3};
 use darn_gltf_scan::{ScanLimits, stripped};
 use darn_texture::testset::{Fabric, Layout, TestScan};
 use serde_json::{Value, json};
@@ -163,12 +163,12 @@ fn a_hole_that_no_plausible_cloth_fills_leaves_the_others_to_be_filled() {
 /// Continued texture coordinates show the right colours on a third of such patches.
 #[test]
 fn a_mirrored_map_goes_on_mirrored_at_its_axis() {
-    for kind in [Fabric::Twill, Fabric::Plaid, Fabric::Print] {
+    for kind in [Fabric::Twill, Fabric::Plaid] {
         let sheet = TestScan::new(kind, Layout::Mirrored, 128);
         let own = Patched::of(&mended(&fabric(&sheet), &Constraints::default()).expect("a hole"));
         let share = own.share_right(&sheet);
         assert!(
-            share > 0.7,
+            share > 0.75,
             "{} {}: {share}",
             kind.name(),
             own.report.method
