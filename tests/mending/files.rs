@@ -1,9 +1,9 @@
 //! What files hold beside the cloth of a scene, and cloth that they store in odd ways.
 
 use darn_budget::Budget;
-use darn_contract::Constraints;
-use darn_geometry::mesh::Vec3;
+use darn_contract::{Constraints, HoleSelector};
 use darn_geometry::mesh::shapes::{holed_sheet, sheet};
+use darn_geometry::mesh::{TriMesh, Vec3};
 use darn_gltf_scan::{ScanLimits, stripped};
 use darn_texture::testset::{Fabric, Layout, TestScan};
 use serde_json::{Value, json};
