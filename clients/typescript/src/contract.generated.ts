@@ -741,7 +741,7 @@ export interface components {
         };
         /** @description What was not taken as the file has it when its loops were found. */
         SetAside: {
-            /** @description Stable word for the kind: `degenerate_face` (no area), `duplicate_face` (the corners of another triangle), `fin` (a triangle on an edge that two others share more smoothly), `flipped_face` (facing the other way than its neighbours), `t_junction` (a border vertex that lies on the border edge of another triangle), `near_seam_vertex` (a border vertex beside another one, within the precision of the coordinates), `vertex_not_finite` (a vertex that no triangle uses). */
+            /** @description Stable word for the kind: `degenerate_face` (no area), `duplicate_face` (the corners of another triangle), `fin` (a triangle on an edge that two others share more smoothly), `flipped_face` (facing the other way than its neighbours), `t_junction` (a border vertex that lies on the border edge of another triangle), `near_seam_vertex` (a border vertex beside another one, within the precision of the coordinates), `vertex_not_finite` (a vertex that no triangle uses), `second_skin_hole` (a hole of a copy that lies on the cloth, as exports with two sides have it). */
             kind?: string;
             /** @description How many there are. */
             count?: number;
@@ -1265,7 +1265,7 @@ export interface components {
          * @description The words of this version; later ones may have more
          * @enum {string}
          */
-        ProblemCode: "empty_body" | "malformed_request" | "digest_mismatch" | "no_query" | "not_found" | "method_not_allowed" | "body_timeout" | "body_too_large" | "message_too_large" | "constraints_too_large" | "query_too_large" | "unsupported_content_encoding" | "unsupported_media_type" | "invalid_constraints" | "invalid_query" | "key_missing" | "key_unknown" | "key_expired" | "insufficient_scope" | "quota_exceeded" | "session_not_found" | "session_expired" | "session_evicted" | "session_deleted" | "session_lost" | "session_elsewhere" | "session_too_large" | "session_busy" | "sessions_full" | "jobs_not_kept" | "no_such_job" | "job_unfinished" | "job_wrong_state" | "job_expired" | "idempotency_mismatch" | "webhooks_off" | "job_crashed_worker" | "storage_full" | "internal" | "queue_full" | "memory_full" | "uploads_full" | "draining" | "no_workers" | "warming_up" | "deadline_exceeded" | "not_a_gltf" | "invalid_gltf" | "invalid_mesh_file" | "scan_too_large" | "index_out_of_range" | "position_not_finite" | "unsupported_extension" | "external_data" | "no_triangles" | "singular_transform" | "constraints_do_not_fit" | "anchor_out_of_reach" | "too_much_work" | "too_much_memory" | "answer_too_large" | "no_holes" | "nothing_to_strip" | "too_many_holes" | "non_manifold_rim" | "coordinates_too_large" | "not_a_disk" | "not_cloth_like" | "too_little_known" | "rim_crosses_itself" | "patch_degenerate" | "no_plausible_fill" | "hole_too_narrow";
+        ProblemCode: "empty_body" | "malformed_request" | "digest_mismatch" | "no_query" | "not_found" | "method_not_allowed" | "body_timeout" | "body_too_large" | "message_too_large" | "constraints_too_large" | "query_too_large" | "unsupported_content_encoding" | "unsupported_media_type" | "invalid_constraints" | "invalid_query" | "key_missing" | "key_unknown" | "key_expired" | "insufficient_scope" | "quota_exceeded" | "session_not_found" | "session_expired" | "session_evicted" | "session_deleted" | "session_lost" | "session_elsewhere" | "session_too_large" | "session_busy" | "sessions_full" | "jobs_not_kept" | "no_such_job" | "job_unfinished" | "job_wrong_state" | "job_expired" | "idempotency_mismatch" | "webhooks_off" | "job_crashed_worker" | "jobs_unavailable" | "storage_full" | "internal" | "queue_full" | "memory_full" | "uploads_full" | "draining" | "no_workers" | "warming_up" | "deadline_exceeded" | "not_a_gltf" | "invalid_gltf" | "invalid_mesh_file" | "scan_too_large" | "index_out_of_range" | "position_not_finite" | "unsupported_extension" | "external_data" | "no_triangles" | "singular_transform" | "constraints_do_not_fit" | "anchor_out_of_reach" | "too_much_work" | "too_much_memory" | "answer_too_large" | "no_holes" | "nothing_to_strip" | "too_many_holes" | "non_manifold_rim" | "coordinates_too_large" | "not_a_disk" | "not_cloth_like" | "too_little_known" | "rim_crosses_itself" | "patch_degenerate" | "no_plausible_fill" | "hole_too_narrow";
         /** @description The version, and the limits that a client can check before it sends a scan */
         Info: {
             /** @description darn's version */
@@ -1358,9 +1358,9 @@ export interface operations {
         parameters: {
             query?: never;
             header?: {
-                /** @description `respond-async`: a job is made, and answered with (202) unless the mend ends within `wait=N` seconds (RFC 7240). Passed over by a service that keeps no jobs */
+                /** @description `respond-async`: a job is made, and answered with (202) unless the mend ends within `wait=N` seconds (RFC 7240), and `Preference-Applied` says so. Passed over by a service that keeps no jobs, and by all other routes */
                 prefer?: string;
-                /** @description A repeated request with the same key and payload is answered with the first one's job; keys of different client addresses are apart */
+                /** @description A repeated request with the same key and payload is answered with the first one's job, also where no more jobs may wait or the disk is full; keys of different client addresses are apart */
                 "idempotency-key"?: string;
             };
             path?: never;
@@ -2486,8 +2486,8 @@ export interface operations {
     listJobs: {
         parameters: {
             query?: {
-                /** @description Only jobs in this state */
-                state?: "waiting" | "running" | "done" | "error" | "cancelled";
+                /** @description Only jobs in this state. None is ever `created`: a job is made when its scan is on disk, and waits from then on; the word is taken for pipelines that ask for it */
+                state?: "created" | "waiting" | "running" | "done" | "error" | "cancelled";
                 /** @description The `next` of the page before */
                 from?: string;
                 /** @description Most jobs of the page */
@@ -2542,7 +2542,7 @@ export interface operations {
                 webhook?: string;
             };
             header?: {
-                /** @description A repeated request with the same key and payload is answered with the first one's job; keys of different client addresses are apart */
+                /** @description A repeated request with the same key and payload is answered with the first one's job, also where no more jobs may wait or the disk is full; keys of different client addresses are apart */
                 "idempotency-key"?: string;
             };
             path?: never;
