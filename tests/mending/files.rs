@@ -130,7 +130,7 @@ fn one_bad_hole_of_four() -> TriMesh {
     let place = |u: f64, v: f64| {
         let near = away(u, v, holes[3]) < 0.14;
         let turn = ((97.0 * u + 61.0 * v) * 41.0).sin().signum();
-        Vec3::new(u, v, if near { 0.15 * turn } else { 0.0 })
+        Vec3::new(u, v, if near { 0.11 * turn } else { 0.0 })
     };
     sheet(48, keep, place)
 }
