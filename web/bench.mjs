@@ -10,7 +10,7 @@ import { sheetGlb } from './tests/fixtures.mjs';
 /** Seconds that new cloth is dragged, and milliseconds between two moves of the pointer. */
 const DRAG = { seconds: 10, pause: 8 };
 /** Squares of a side of the large scan, two triangles each, and frames that are drawn of it. */
-const LARGE = { side: 1000, frames: 200 };
+const LARGE = { side: 1000, frames: 10 };
 
 const load = loadavg()[0];
 const [browser, service] = await Promise.all([startBrowser(), startService()]);
@@ -159,12 +159,16 @@ async function largeScan() {
   const { times, calls, triangles } = await page.evaluate(async (count) => {
     const { viewer } = document.querySelector('darn-editor').shadowRoot.querySelector('darn-stage');
     const all = [];
+    const gl = viewer.renderer.getContext();
+    const pixel = new Uint8Array(4);
     for (let frame = 0; frame < count; frame += 1) {
       await new Promise((done) => requestAnimationFrame(done));
       const start = performance.now();
       viewer.controls.rotateLeft(0.02);
       viewer.drawNow();
       all.push(performance.now() - start);
+      // Frames that a processor draws take longer than their script: they must not pile up.
+      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
     }
     const { render } = viewer.renderer.info;
     return { times: all, calls: render.calls, triangles: render.triangles };
