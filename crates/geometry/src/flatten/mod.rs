@@ -229,8 +229,8 @@ mod tests {
             let tutte = tutte::embed(&region, Budget::unlimited()).expect("a layout");
             let [a, b] = [unfolded, tutte].map(|start| energy.minimise(start, ROUNDS).expect("a chart").flat);
             let (a, b) = (stretch(mesh, &mesh.faces, &a).mean - 1.0, stretch(mesh, &mesh.faces, &b).mean - 1.0);
-            // Rough cloth has minima beside each other: 7 % apart in one of ten thousand cases.
-            prop_assert!((a - b).abs() < 0.12 * b + 1e-6, "{a} {b}");
+            // Rough cloth has minima beside each other: 2.4 % apart in one of thousands of cases, 7.2 % once.
+            prop_assert!((a - b).abs() < 0.08 * b + 1e-6, "{a} {b}");
         }
     }
 }
