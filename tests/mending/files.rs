@@ -160,15 +160,14 @@ fn a_hole_that_no_plausible_cloth_fills_leaves_the_others_to_be_filled() {
     assert_eq!(refused.code().word, "no_plausible_fill");
 }
 
-/// Continued texture coordinates show the right colours on a third of such patches.
 #[test]
 fn a_mirrored_map_goes_on_mirrored_at_its_axis() {
-    for kind in [Fabric::Twill, Fabric::Plaid] {
+    for (kind, least) in [(Fabric::Twill, 0.85), (Fabric::Plaid, 0.75)] {
         let sheet = TestScan::new(kind, Layout::Mirrored, 128);
         let own = Patched::of(&mended(&fabric(&sheet), &Constraints::default()).expect("a hole"));
         let share = own.share_right(&sheet);
         assert!(
-            share > 0.75,
+            share > least,
             "{} {}: {share}",
             kind.name(),
             own.report.method

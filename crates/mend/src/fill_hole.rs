@@ -78,7 +78,7 @@ impl<'a> HoleContext<'a> {
     /// targets that lie far away is itself stretched.
     fn constrained_patch(&self, moved: &[Vec3], pulls: &[Pull]) -> Result<Patch, MendError> {
         let (hole, unedited) = (self.hole, &self.unedited);
-        let usual = quality::stretch(&unedited.patch).most;
+        let usual = quality::stretch(&unedited.patch).max;
         let most = stretch_limit(usual);
         let pulls = PatchPulls {
             pulls,
@@ -94,7 +94,7 @@ impl<'a> HoleContext<'a> {
             let each = unedited.filled.iter().zip(moved);
             let filled: Vec<Vec3> = each.map(|(from, to)| from.lerp(to, share)).collect();
             let tried = patch(&filled)?;
-            let found = quality::stretch(&tried).most;
+            let found = quality::stretch(&tried).max;
             if found <= most {
                 return Ok(tried);
             }

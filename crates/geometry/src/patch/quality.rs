@@ -23,15 +23,15 @@ pub struct Quality {
 
 /// How far the edges of a patch with an inner vertex are stretched: length ÷ length in the chart.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stretch {
+pub struct PatchStretch {
     /// The mean; 1 without such edges or a chart.
     pub mean: f64,
     /// The maximum of the same.
-    pub most: f64,
+    pub max: f64,
 }
 
 /// Measures how far a patch is stretched.
-pub fn stretch(patch: &Patch) -> Stretch {
+pub fn stretch(patch: &Patch) -> PatchStretch {
     let (mut edges, mut sum, mut most) = (0usize, 0.0, 0.0f64);
     for face in &patch.faces {
         let p = face.map(|v| patch.positions[v as usize]);
@@ -50,13 +50,13 @@ pub fn stretch(patch: &Patch) -> Stretch {
         }
     }
     match edges {
-        0 => Stretch {
+        0 => PatchStretch {
             mean: 1.0,
-            most: 1.0,
+            max: 1.0,
         },
-        edges => Stretch {
+        edges => PatchStretch {
             mean: sum / edges as f64,
-            most,
+            max: most,
         },
     }
 }
@@ -73,7 +73,7 @@ pub fn measure(patch: &Patch, region: &Region) -> Quality {
     Quality {
         area: patch.faces.iter().map(area).sum(),
         stretch_mean: stretch.mean,
-        stretch_max: stretch.most,
+        stretch_max: stretch.max,
         gaussian_curvature: gaussian_curvature(patch),
         seam_gap: patch.rim.iter().enumerate().map(gap).fold(0.0, f64::max),
         self_intersections: patch.crossings,
