@@ -4,7 +4,7 @@ use std::{collections::BTreeSet, path::Path, process::Command};
 
 use serde_json::Value;
 
-use crate::{EXAMPLE, WHOLE};
+use crate::{EXAMPLE, WHOLE, commands::code_and_lines};
 
 const PAGE: &str = include_str!("../../docs/pipelines.md");
 const TOOL: &str = include_str!("../../docs/cook/DarnTool.ts");
@@ -36,12 +36,7 @@ fn run(scan: &Path, output: &Path, report: &Path) -> (Option<i32>, Vec<Value>) {
         line = line.replace(&place, path.to_str().expect("a name"));
     }
     let ran = Command::new("sh").args(["-c", &line]).output();
-    let ran = ran.expect("a shell");
-    let text = String::from_utf8(ran.stdout).expect("text");
-    let lines = text
-        .lines()
-        .map(|line| serde_json::from_str(line).expect("JSON"));
-    (ran.status.code(), lines.collect())
+    code_and_lines(ran.expect("a shell"))
 }
 
 #[test]

@@ -1,11 +1,8 @@
 //! Scans of several files, however the files and the URIs are spelled: by HTTP and by the command.
 
 use super::EXAMPLE;
-use super::darn;
+use super::commands::{holes, zipped};
 use super::running::{self, Service};
-use std::io::{Cursor, Write as _};
-use zip::ZipWriter;
-use zip::write::SimpleFileOptions;
 
 /// A URI of a glTF, the name of the part or zip entry that its sender gives to the file, and the file's path beside the glTF.
 const SPELLINGS: [[&str; 3]; 8] = [
@@ -37,16 +34,6 @@ fn form(parts: &[(&str, &[u8])]) -> Vec<u8> {
     }
     body.extend(b"--cut--\r\n");
     body
-}
-
-fn zipped(files: &[(&str, &[u8])]) -> Vec<u8> {
-    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
-    for (name, bytes) in files {
-        zip.start_file(*name, SimpleFileOptions::default())
-            .expect("an entry");
-        zip.write_all(bytes).expect("written");
-    }
-    zip.finish().expect("a zip").into_inner()
 }
 
 #[tokio::test]
@@ -95,15 +82,6 @@ async fn parts_and_entries_are_found_however_they_are_spelled() {
 
 #[test]
 fn the_command_reads_siblings_however_their_uri_is_spelled() {
-    let holes = |scan: &std::path::Path| {
-        let found = darn().arg("holes").arg(scan).output().expect("darn runs");
-        assert!(
-            found.status.success(),
-            "{}",
-            String::from_utf8_lossy(&found.stderr)
-        );
-        found.stdout
-    };
     let folder = tempfile::tempdir().expect("a folder");
     let glb = folder.path().join("cloth.glb");
     std::fs::write(&glb, EXAMPLE).expect("written");

@@ -1,5 +1,6 @@
 //! The binary as a user meets it: `darn serve` on a real socket, and the commands beside it.
 
+mod commands;
 mod cook;
 mod files;
 #[cfg(target_os = "linux")]
@@ -17,9 +18,11 @@ mod small_disk;
 mod traces;
 mod webhooks;
 
+use commands::{code_and_lines, holes};
 use running::Service;
 use std::{
     io::Write as _,
+    path::Path,
     process::{Command, Stdio},
 };
 
@@ -198,7 +201,7 @@ fn samples_are_fixed_size_records_that_depend_on_the_seed_alone() {
 }
 
 /// The example as glTF with its buffer beside it, in `folder`; returns the glTF's path.
-fn separate(folder: &std::path::Path) -> std::path::PathBuf {
+fn separate(folder: &Path) -> std::path::PathBuf {
     let length = |at: usize| u32::from_le_bytes(EXAMPLE[at..at + 4].try_into().unwrap()) as usize;
     let end = 20 + length(12);
     let mut json: serde_json::Value = serde_json::from_slice(&EXAMPLE[20..end]).expect("JSON");
@@ -216,17 +219,8 @@ fn a_scan_of_several_files_is_mended_as_its_glb() {
     let scan = separate(folder.path());
     let glb = folder.path().join("scarf.glb");
     std::fs::write(&glb, EXAMPLE).expect("written");
-    let holes = |scan: &std::path::Path| {
-        let found = darn().arg("holes").arg(scan).output().expect("darn runs");
-        assert!(
-            found.status.success(),
-            "{}",
-            String::from_utf8_lossy(&found.stderr)
-        );
-        found.stdout
-    };
     assert_eq!(holes(&scan), holes(&glb));
-    let mend = |scan: &std::path::Path, out: &str| {
+    let mend = |scan: &Path, out: &str| {
         let out = folder.path().join(out);
         std::fs::create_dir_all(out.parent().expect("a folder")).expect("made");
         let mended = darn().arg("inpaint").arg(scan).arg("-o").arg(&out).status();
@@ -274,11 +268,7 @@ fn commands_have_the_limits_of_the_service() {
 const WHOLE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
 
 /// Runs a batch over a folder: its exit code, and its lines by the name of their scans.
-fn batch(
-    scans: &std::path::Path,
-    out: &std::path::Path,
-    more: &[&str],
-) -> (Option<i32>, Vec<serde_json::Value>) {
+fn batch(scans: &Path, out: &Path, more: &[&str]) -> (Option<i32>, Vec<serde_json::Value>) {
     let mut command = darn();
     command
         .arg("inpaint")
@@ -287,12 +277,7 @@ fn batch(
         .arg("-o")
         .arg(out)
         .args(more);
-    let ran = command.output().expect("darn runs");
-    let text = String::from_utf8(ran.stdout).expect("text");
-    let lines = text
-        .lines()
-        .map(|line| serde_json::from_str(line).expect("a line of JSON"));
-    (ran.status.code(), lines.collect())
+    code_and_lines(command.output().expect("darn runs"))
 }
 
 #[test]

@@ -1,14 +1,15 @@
 //! OBJ with its material library and images, on the command line and over HTTP.
 
 use std::{
-    io::{Cursor, Read as _, Write as _},
+    io::{Cursor, Read as _},
     path::Path,
 };
 
 use reqwest::multipart::{Form, Part};
-use zip::{ZipArchive, ZipWriter, write::SimpleFileOptions};
+use zip::ZipArchive;
 
 use crate::{
+    commands::zipped,
     darn,
     running::{Service, client, sheet},
 };
@@ -82,18 +83,12 @@ fn the_materials_of_an_obj_go_where_it_goes() {
     );
 }
 
-fn zipped() -> Vec<u8> {
-    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
-    for (name, bytes) in [
+fn zip_of_all() -> Vec<u8> {
+    zipped(&[
         ("cloth/cloth.obj", obj().as_bytes()),
         ("cloth/my cloth.mtl", MTL.as_bytes()),
         ("cloth/maps/my linen.png", PICTURE),
-    ] {
-        zip.start_file(name, SimpleFileOptions::default())
-            .expect("an entry");
-        zip.write_all(bytes).expect("written");
-    }
-    zip.finish().expect("a zip").into_inner()
+    ])
 }
 
 #[tokio::test]
@@ -147,7 +142,7 @@ async fn an_obj_with_materials_is_taken_in_parts_and_in_a_zip() {
     assert_eq!(names(&zip), expected);
 
     // A zip for a zip; `/holes` finds what there is, and `/strip` takes the patch out again.
-    let sent = zipped();
+    let sent = zip_of_all();
     let send = |path: &str, zip: &[u8]| {
         let request = client
             .post(service.url(path))

@@ -1,15 +1,12 @@
 //! `darn inpaint --provenance`: the files on disk are those that it names.
 
 use std::collections::BTreeMap;
-use std::io::{Cursor, Write as _};
 use std::path::Path;
 
 use serde_json::{Value, json};
 use sha2::{Digest as _, Sha256};
-use zip::ZipWriter;
-use zip::write::SimpleFileOptions;
 
-use crate::{EXAMPLE, darn};
+use crate::{EXAMPLE, commands::zipped, darn};
 
 fn sha256(bytes: &[u8]) -> String {
     let digest = Sha256::digest(bytes);
@@ -25,16 +22,6 @@ fn separate() -> (Vec<u8>, Vec<u8>) {
         json.to_string().into_bytes(),
         EXAMPLE[28 + length..].to_vec(),
     )
-}
-
-fn zipped(files: &[(&str, &[u8])]) -> Vec<u8> {
-    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
-    for (name, bytes) in files {
-        let started = zip.start_file(*name, SimpleFileOptions::default());
-        started.expect("an entry");
-        zip.write_all(bytes).expect("written");
-    }
-    zip.finish().expect("a zip").into_inner()
 }
 
 /// Mends a file in a folder; the labels of all files in the provenance by their SHA-256, and the document.

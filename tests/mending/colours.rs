@@ -9,7 +9,8 @@ use serde_json::json;
 
 use super::cloth::{mended, mender, read};
 use super::patched::{
-    BEND, Patched, chunks, data_uri, edited, fabric, fabric_at, png, push, unbent, with_texture,
+    BEND, Patched, chunks, data_uri, edited, fabric, fabric_at, png, push, push_variant, unbent,
+    with_texture,
 };
 
 pub fn patched(bytes: &[u8], texture: Option<TextureChoice>) -> Patched {
@@ -212,12 +213,7 @@ fn every_variant_of_the_cloth_has_its_own_image_on_the_patch() {
         push(&mut json["textures"], json!({ "source": 1 }));
         let mut other = json["materials"][0].clone();
         other["pbrMetallicRoughness"]["baseColorTexture"]["index"] = json!(1);
-        push(&mut json["materials"], other);
-        json["extensionsUsed"] = json!(["KHR_materials_variants"]);
-        json["extensions"] =
-            json!({"KHR_materials_variants": {"variants": [{ "name": "swapped" }]}});
-        json["meshes"][0]["primitives"][0]["extensions"] =
-            json!({"KHR_materials_variants": {"mappings": [{ "material": 1, "variants": [0] }]}});
+        push_variant(json, other);
     });
     let own = patched(&bytes, None);
     assert_eq!(

@@ -9,7 +9,9 @@ use serde_json::{Value, json};
 
 use super::cloth::{mended, packed};
 use super::colours::patched;
-use super::patched::{bent, chunks, data_uri, edited, fabric, png, push, with_texture};
+use super::patched::{
+    bent, chunks, data_uri, edited, fabric, png, push, push_variant, with_texture,
+};
 
 /// A file with all that a texture can have here: an atlas, a normal map, roughness and occlusion in one image, two variants.
 fn with_everything() -> Vec<u8> {
@@ -38,12 +40,7 @@ fn with_everything() -> Vec<u8> {
         let mut other = material.clone();
         other["name"] = json!("swapped");
         other["pbrMetallicRoughness"]["baseColorTexture"]["index"] = json!(3);
-        push(&mut json["materials"], other);
-        json["extensionsUsed"] = json!(["KHR_materials_variants"]);
-        json["extensions"] =
-            json!({"KHR_materials_variants": {"variants": [{ "name": "swapped" }]}});
-        json["meshes"][0]["primitives"][0]["extensions"] =
-            json!({"KHR_materials_variants": {"mappings": [{ "material": 1, "variants": [0] }]}});
+        push_variant(json, other);
     })
 }
 

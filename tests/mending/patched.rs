@@ -42,6 +42,15 @@ pub fn push(list: &mut Value, value: Value) {
     list.as_array_mut().expect("a list").push(value);
 }
 
+/// Adds a second material, which the variant `swapped` chooses.
+pub fn push_variant(json: &mut Value, material: Value) {
+    push(&mut json["materials"], material);
+    json["extensionsUsed"] = json!(["KHR_materials_variants"]);
+    json["extensions"] = json!({"KHR_materials_variants": {"variants": [{ "name": "swapped" }]}});
+    json["meshes"][0]["primitives"][0]["extensions"] =
+        json!({"KHR_materials_variants": {"mappings": [{ "material": 1, "variants": [0] }]}});
+}
+
 pub fn data_uri(bytes: &[u8]) -> String {
     format!("data:image/png;base64,{}", STANDARD.encode(bytes))
 }
