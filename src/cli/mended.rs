@@ -11,6 +11,7 @@ use darn_lab::garments::set::as_glb;
 use darn_lab::scarffolds::holed_scan::HoledScan;
 use darn_mend::NetworkMender;
 use std::error::Error;
+use std::sync::Arc;
 
 type BoxedError = Box<dyn Error + Send + Sync>;
 
@@ -65,5 +66,5 @@ fn through_glb(
     };
     let mended = darn_mend::mend(&request, &constraints, mender)?;
     let scan = Scan::read(mended.bytes, &ScanLimits::default())?;
-    Ok(weld::weld(&scan.surface).mesh)
+    Ok(Arc::unwrap_or_clone(weld::weld(&scan.surface).mesh))
 }

@@ -61,8 +61,8 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
         (true, _) => coloured(&scan, &welded, args)?,
         (false, true) => confident(&scan, &welded, args)?,
         (false, false) => {
-            let faces = welded.soup_face.iter();
-            let tints: Vec<[u8; 3]> = faces.map(|&face| tint(&scan, face)).collect();
+            let faces = welded.soup_faces.iter();
+            let tints: Vec<[u8; 3]> = faces.map(|face| tint(&scan, face)).collect();
             picture(&welded.mesh, &tints, &args.options())
         }
     };
@@ -86,7 +86,7 @@ fn coloured(scan: &Scan, welded: &WeldedMesh, args: &RenderArgs) -> Result<RgbIm
     let paint = ScanPaint::new(scan, variant, &args.limits.limits());
     let at = |place: &FacePlace| {
         let face = FaceId(place.face as u32);
-        let part = (welded.soup_face.get(place.face)).and_then(|face| scan.part_of_face(*face));
+        let part = (welded.soup_faces.of(face)).and_then(|own| scan.part_of_face(own));
         let corners = welded.soup_corners(&scan.surface, face);
         match part.zip(corners) {
             Some((part, corners)) => paint.at(part, corners, place.weights),
@@ -109,7 +109,7 @@ fn confident(scan: &Scan, welded: &WeldedMesh, args: &RenderArgs) -> Result<RgbI
     );
     let at = |place: &FacePlace| {
         let face = FaceId(place.face as u32);
-        let part = (welded.soup_face.get(place.face)).and_then(|face| scan.part_of_face(*face));
+        let part = (welded.soup_faces.of(face)).and_then(|own| scan.part_of_face(own));
         match part.zip(welded.soup_corners(&scan.surface, face)) {
             Some((part, corners)) => paint.at(part, corners, place.weights),
             None => [1.0; 3],

@@ -1,5 +1,7 @@
 //! Bites, rips and torn corners at the cloth's own edge.
 
+use std::sync::Arc;
+
 use darn_budget::Budget;
 use darn_contract::port::HolesQuery;
 use darn_contract::{Border, Constraints, HoleSelector, TornEdge, v1};
@@ -20,10 +22,8 @@ fn asking(border: Border) -> Constraints {
 
 /// A sheet of 48 squares a side without what `keep` leaves out, folded along v.
 fn torn(keep: impl Fn(f64, f64) -> bool, fold: f64) -> TriMesh {
-    weld(&sheet(48, keep, |u, v| {
-        Vec3::new(u, v, fold * (9.0 * u).sin())
-    }))
-    .mesh
+    let folded = sheet(48, keep, |u, v| Vec3::new(u, v, fold * (9.0 * u).sin()));
+    Arc::unwrap_or_clone(weld(&folded).mesh)
 }
 
 fn bitten(u: f64, v: f64) -> bool {

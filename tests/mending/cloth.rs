@@ -5,6 +5,7 @@ use std::sync::{Arc, OnceLock};
 use darn_contract::Constraints;
 use darn_contract::port::Mended;
 use darn_geometry::mesh::curvature::{face_areas, vertex_normals};
+use darn_geometry::mesh::index::FaceId;
 use darn_geometry::mesh::loops::{BoundaryLoop, boundary_loops};
 use darn_geometry::mesh::topology::Topology;
 use darn_geometry::mesh::weld::{WeldedMesh, weld};
@@ -103,7 +104,9 @@ impl MendedScan {
         let topology = Topology::new(&welded.mesh);
         let loops = boundary_loops(&welded.mesh, &topology);
         let new = |f: &usize| {
-            let part = scan.part_of_face(welded.soup_face[*f]).expect("a part");
+            let part = (welded.soup_faces.of(FaceId(*f as u32)))
+                .and_then(|own| scan.part_of_face(own))
+                .expect("a part");
             scan.parts[part].reconstructed
         };
         let patch = (0..welded.mesh.faces.len()).filter(new).collect();

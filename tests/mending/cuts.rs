@@ -310,7 +310,7 @@ fn what_a_mesher_sealed_is_listed_with_a_cut_that_takes_it_out() {
         .iter()
         .find(|l| l.kind == LoopKind::Hole)
         .expect("a hole");
-    let mut sealed = seen.welded.mesh.clone();
+    let mut sealed = TriMesh::clone(&seen.welded.mesh);
     let ends = rim.vertices[1..].windows(2);
     sealed
         .faces

@@ -24,7 +24,7 @@ fn sleeve(keep: impl Fn(f64, f64) -> bool, fold: impl Fn(f64, f64) -> f64) -> Tr
         let radius = 1.0 + fold(angle, z);
         Vec3::new(radius * angle.cos(), radius * angle.sin(), z)
     };
-    weld(&sheet(72, keep, place)).mesh
+    Arc::unwrap_or_clone(weld(&sheet(72, keep, place)).mesh)
 }
 
 /// Everything but a hole that takes this share of the circumference and a quarter of the height.

@@ -94,8 +94,10 @@ pub(crate) struct VertexBlock {
     pub start: u32,
     /// Largest coordinate of the node's origin in the scene.
     pub origin: f64,
-    /// As stored, in the node's space.
-    pub local: Vec<[f32; 3]>,
+    /// How many vertices.
+    pub count: u32,
+    /// As stored, in the node's space; `None` where that is the scene's space, whose positions in f32 are the same numbers.
+    pub local: Option<Vec<[f32; 3]>>,
 }
 
 impl Scan {
@@ -170,7 +172,12 @@ impl Scan {
         };
         let parts: usize = self.parts.iter().map(attributes).sum();
         let surface = 24 * self.surface.positions.len() + 12 * self.surface.faces.len();
-        let local: usize = self.blocks.iter().map(|b| 12 * b.local.len()).sum();
+        let local: usize = self
+            .blocks
+            .iter()
+            .flat_map(|b| &b.local)
+            .map(|local| 12 * local.len())
+            .sum();
         surface + local + parts
     }
 
@@ -227,7 +234,15 @@ impl Scan {
             .partition_point(|block| block.start <= vertex)
             .checked_sub(1)?;
         let block = self.blocks.get(at)?;
-        let local = *block.local.get((vertex - block.start) as usize)?;
+        let index = (vertex - block.start) as usize;
+        let local = match &block.local {
+            Some(local) => *local.get(index)?,
+            None if index < block.count as usize => {
+                let point = self.surface.positions.get(vertex as usize)?;
+                point.cast::<f32>().into()
+            }
+            None => return None,
+        };
         Some((block.node, local))
     }
 }

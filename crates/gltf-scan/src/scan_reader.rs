@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::mesh::{TRIANGLE_FAN, TRIANGLE_STRIP, TRIANGLES};
+use rayon::prelude::*;
 use serde_json::Value;
 
 use super::accessor::{Accessor, is_unsigned};
@@ -222,22 +223,34 @@ impl<'d, 'a> ScanReader<'d, 'a> {
         };
         limit.check(first.saturating_add(accessor.count), &accessor.pointer)?;
         let local = accessor.floats([0.0_f32; 3])?;
-        self.surface.positions.reserve(local.len());
-        for (vertex, point) in (first as u32..).zip(&local) {
-            let point = node.transform.point(Vec3::from(point.map(f64::from)));
-            if point.iter().all(|x| x.is_finite()) {
-                self.surface.positions.push(point);
-            } else {
+        let in_scene_space = node.transform.is_identity();
+        let placed = local.par_iter().map(|point| {
+            let point = Vec3::from(point.map(f64::from));
+            match in_scene_space {
+                true => point,
+                false => node.transform.point(point),
+            }
+        });
+        let mut placed: Vec<Vec3> = placed.collect();
+        let unusable_before = self.not_finite.len();
+        for (vertex, point) in (first as u32..).zip(&mut placed) {
+            if point.iter().any(|x| !x.is_finite()) {
                 self.not_finite.push(vertex);
-                self.surface.positions.push(Vec3::zeros());
+                *point = Vec3::zeros();
             }
         }
         let (start, count) = (first as u32, local.len() as u32);
+        match self.surface.positions.is_empty() {
+            true => self.surface.positions = placed,
+            false => self.surface.positions.append(&mut placed),
+        }
+        let is_same = in_scene_space && self.not_finite.len() == unusable_before;
         self.blocks.push(VertexBlock {
             node: node.index,
             start,
+            count,
             origin: node.transform.offset.amax(),
-            local,
+            local: (!is_same).then_some(local),
         });
         Ok(start..start + count)
     }
@@ -261,7 +274,10 @@ impl<'d, 'a> ScanReader<'d, 'a> {
         let element = element as usize;
         let pointer = match block {
             // The stored position is sound: its node's transform overflows.
-            Some(block) if block.local[element].iter().all(|x| x.is_finite()) => {
+            Some(block)
+                if (block.local.as_ref().and_then(|local| local.get(element)))
+                    .is_some_and(|stored| stored.iter().all(|x| x.is_finite())) =>
+            {
                 format!("/nodes/{}", block.node)
             }
             _ => accessor.into(),

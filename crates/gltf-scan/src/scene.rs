@@ -30,6 +30,11 @@ impl NodeTransform {
         }
     }
 
+    /// Whether the node's space is the scene's.
+    pub fn is_identity(&self) -> bool {
+        self.linear == Matrix3::identity() && self.offset == Vec3::zeros()
+    }
+
     /// A point of the node's space in the scene.
     pub fn point(&self, local: Vec3) -> Vec3 {
         self.linear * local + self.offset

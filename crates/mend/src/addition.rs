@@ -254,9 +254,7 @@ fn patch_bytes(vertices: usize, columns: usize) -> usize {
 /// Whether most triangles of a region have a twin that shows their other side.
 fn is_backed(region: &Region, welded: &WeldedScan) -> bool {
     let backed = region.faces.iter();
-    let backed = backed
-        .filter(|f| welded.surface.two_sided[f.index()])
-        .count();
+    let backed = backed.filter(|f| welded.surface.is_two_sided(**f)).count();
     2 * backed > region.faces.len()
 }
 

@@ -213,7 +213,7 @@ impl FlatLine {
 
 /// The angle of the faces at a vertex, radians.
 fn inner_angle(mesh: &TriMesh, topology: &Topology, vertex: VertexId) -> f64 {
-    let leaving = topology.leaving(vertex).iter();
+    let leaving = topology.leaving(vertex).into_iter();
     leaving
         .map(|h| mesh.corner_angle(h.face().index(), h.corner()))
         .sum()

@@ -214,7 +214,10 @@ impl Pieces {
             }
         }
         let areas = face_areas(mesh);
-        let goes = |f: FaceId| is_cut[whole.surface.soup_face[f.index()] as usize];
+        let goes = |f: FaceId| {
+            let own = whole.surface.soup_faces.of(f);
+            own.is_some_and(|own| is_cut[own as usize])
+        };
         let mut of_face: Vec<Option<u32>> = vec![None; mesh.faces.len()];
         let mut all: Vec<Piece> = Vec::new();
         let mut across = HashMap::new();
@@ -396,12 +399,8 @@ impl CutLoopsDraft<'_> {
     }
 
     fn pieces_of(&self, entry: &CutEntry) -> BTreeSet<u32> {
-        let own = self
-            .whole
-            .surface
-            .soup_face
-            .iter()
-            .zip(&self.pieces.of_face);
+        let soup_faces = self.whole.surface.soup_faces.iter();
+        let own = soup_faces.zip(&self.pieces.of_face);
         own.filter(|(soup, _)| entry.faces.binary_search(soup).is_ok())
             .filter_map(|(_, piece)| *piece)
             .collect()

@@ -101,7 +101,7 @@ fn at_loops(
     for rim in ids.iter().filter_map(|id| whole.loops.get(*id as usize)) {
         for face in (rim.vertices.iter()).flat_map(|v| whole.topology.faces_at(*v)) {
             places.insert(triangle_key(&mesh.triangle(face.index())));
-            own.insert(whole.surface.soup_face[face.index()]);
+            own.extend(whole.surface.soup_faces.of(face));
         }
     }
     let all = (0..faces.len()).filter(|f| {
@@ -130,15 +130,9 @@ impl Layer<'_> {
     fn of(&self, reached: Vec<u32>, points: &[Vec3]) -> Result<Vec<u32>, Exhausted> {
         let (mesh, topology) = (&self.whole.surface.mesh, &self.whole.topology);
         self.budget.spend(PIECE_WORK * reached.len() as u64)?;
-        let soup_face = &self.whole.surface.soup_face;
-        // The parts of a split face have the same face in the scan.
-        let parts = |f: &u32| {
-            let first = soup_face.partition_point(|own| own < f);
-            let last = soup_face.partition_point(|own| own <= f);
-            (first..last).map(|part| FaceId(part as u32))
-        };
+        let soup_faces = &self.whole.surface.soup_faces;
         let mut pieces: BTreeMap<FaceId, Option<usize>> = (reached.iter())
-            .flat_map(parts)
+            .flat_map(|f| soup_faces.parts(*f))
             .map(|face| (face, None))
             .collect();
         let mut goes_on: Vec<bool> = Vec::new();
@@ -191,7 +185,7 @@ impl Layer<'_> {
             .filter(|(_, piece)| on_cloth(piece) && !meant.contains(*piece))
             .map(|(face, _)| *face)
             .collect();
-        let own: HashSet<u32> = left.iter().map(|f| soup_face[f.index()]).collect();
+        let own: HashSet<u32> = left.iter().filter_map(|f| soup_faces.of(*f)).collect();
         let left = left.iter().map(|f| triangle_key(&mesh.triangle(f.index())));
         let left: HashSet<[Place; 3]> = left.collect();
         let surface = &self.scan.surface;

@@ -20,7 +20,7 @@ use darn_gltf_scan::Scan;
 
 /// The welded surface of a scan and its loops.
 pub struct WeldedScan {
-    /// The welded mesh; `soup_face` leads from its faces back to the scan's.
+    /// The welded mesh; `soup_faces` lead from its faces back to the scan's.
     pub surface: WeldedMesh,
     /// Its topology.
     pub topology: Topology,
@@ -120,8 +120,10 @@ impl WeldedScan {
         let mesh = &self.surface.mesh;
         let loops = self.loops.iter().map(|l| 8 * l.vertices.len() + 200);
         let loops: usize = loops.sum();
-        // For a vertex its position and the topology's entry; for a face its corners, twins and origin.
-        (24 + 8) * mesh.positions.len() + (12 + 16 + 4) * mesh.faces.len() + loops
+        // For a vertex its position and a half-edge; for a face its corners and twins, in a scan of several pieces the piece's number.
+        let pieces = if self.topology.components > 1 { 4 } else { 0 };
+        let faces = (12 + 12 + pieces) * mesh.faces.len() + self.surface.soup_faces.bytes();
+        (24 + 4) * mesh.positions.len() + faces + loops
     }
 
     /// The welded mesh with its borders.
@@ -149,7 +151,7 @@ impl WeldedScan {
 
     /// The scan's face that a welded face was made of; none for those behind its surface.
     pub fn source(&self, scan: &Scan, face: FaceId) -> Option<SourceFace> {
-        let own = *self.surface.soup_face.get(face.index())?;
+        let own = self.surface.soup_faces.of(face)?;
         Some(SourceFace {
             part: scan.part_of_face(own)?,
             corners: self.surface.soup_corners(&scan.surface, face)?,

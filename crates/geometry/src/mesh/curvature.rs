@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::index::VertexId;
+use super::index::{HalfEdgeId, VertexId};
 use super::topology::Topology;
 use super::{TriMesh, Vec3};
 
@@ -10,9 +10,18 @@ use super::{TriMesh, Vec3};
 /// (Gauss–Bonnet), 0 on developable cloth. On the boundary that is not curvature; see
 /// [`turning`](super::turning::turning).
 pub fn angle_defect(mesh: &TriMesh, topology: &Topology, vertex: VertexId) -> f64 {
-    let leaving = topology.leaving(vertex).iter();
-    let angles = leaving.map(|h| mesh.corner_angle(h.face().index(), h.corner()));
-    TAU - angles.sum::<f64>()
+    angle_defect_of(topology, vertex, |h| {
+        mesh.corner_angle(h.face().index(), h.corner())
+    })
+}
+
+/// [`angle_defect`] for angles that another function gives: that of a face where a half-edge starts.
+pub(super) fn angle_defect_of(
+    topology: &Topology,
+    vertex: VertexId,
+    angle: impl Fn(HalfEdgeId) -> f64,
+) -> f64 {
+    TAU - topology.leaving(vertex).into_iter().map(angle).sum::<f64>()
 }
 
 /// Per face its area, scene units squared.

@@ -50,8 +50,9 @@ pub(super) fn geodesic_distance(
             continue;
         }
         let from = distance[vertex.index()];
-        steps.take(FAN_WORK * topology.leaving(vertex).len() as u64)?;
-        for &h in topology.leaving(vertex) {
+        let leaving = topology.leaving(vertex);
+        steps.take(FAN_WORK * leaving.len() as u64)?;
+        for h in leaving {
             let (a, b) = (topology.target(h), topology.origin(h.previous()));
             for (goal, other) in [(a, b), (b, a)] {
                 if done[goal.index()] {

@@ -221,7 +221,7 @@ impl<'a> Growth<'a> {
         let mut taken: Vec<FaceId> = Vec::new();
         for v in ties {
             let mut fans: Vec<Vec<FaceId>> = Vec::new();
-            for &h in self.whole.topology.leaving(v) {
+            for h in self.whole.topology.leaving(v) {
                 if on_border(h) {
                     let around = |e: &HalfEdgeId| across(e.previous());
                     let mut fan: Vec<FaceId> = std::iter::successors(Some(h), around)

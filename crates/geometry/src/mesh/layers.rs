@@ -46,7 +46,7 @@ impl Layers {
                 && !mesh.faces[*face].iter().any(touches)
         };
         let near: Vec<usize> = blocks.near(&place).filter(is_near).collect();
-        let component = |face: usize| topology.component[face];
+        let component = |face: usize| topology.component(FaceId(face as u32));
         let holes_own = region.faces.first().map(|f| component(f.index()));
         Layers {
             mesh: mesh.part(near.iter().map(|f| mesh.faces[*f])),

@@ -187,7 +187,7 @@ fn measured(mesh: &TriMesh, topology: &Topology, half_edges: Vec<HalfEdgeId>) ->
         evidence: Vec::new(),
         component: half_edges
             .first()
-            .map_or(0, |h| topology.component[h.face().index()]),
+            .map_or(0, |h| topology.component(h.face())),
         non_manifold: {
             let unjoined = |h: &&HalfEdgeId| topology.non_manifold.binary_search(h).is_ok();
             2 * half_edges.iter().filter(unjoined).count() > half_edges.len()
@@ -210,6 +210,7 @@ fn kind(turning: f64) -> LoopKind {
 #[cfg(test)]
 mod tests {
     use std::f64::consts::TAU;
+    use std::sync::Arc;
 
     use proptest::prelude::*;
 
@@ -219,7 +220,7 @@ mod tests {
     use crate::mesh::turning::turning;
     use crate::mesh::weld::weld;
 
-    fn loops_of(soup: &TriMesh) -> (TriMesh, Topology, Vec<BoundaryLoop>) {
+    fn loops_of(soup: &TriMesh) -> (Arc<TriMesh>, Topology, Vec<BoundaryLoop>) {
         let mesh = weld(soup).mesh;
         let topology = Topology::new(&mesh);
         let loops = boundary_loops(&mesh, &topology);
@@ -275,7 +276,7 @@ mod tests {
             let mut totals = vec![0.0; topology.components];
             for v in (0..mesh.positions.len() as u32).map(VertexId).filter(|v| !boundary[v.index()]) {
                 let face = topology.faces_at(v).next().expect("welded meshes have no unused vertex");
-                totals[topology.component[face.index()] as usize] += angle_defect(&mesh, &topology, v);
+                totals[topology.component(face) as usize] += angle_defect(&mesh, &topology, v);
             }
             for l in &loops {
                 totals[l.component as usize] += turning(&mesh, &topology, &l.half_edges);

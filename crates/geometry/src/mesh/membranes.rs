@@ -81,7 +81,7 @@ impl<'a> Search<'a> {
         let mut edges: Vec<Vec<f64>> = vec![Vec::new(); topology.components];
         for face in (0..mesh.faces.len() as u32).map(FaceId) {
             let lengths = face.half_edges().map(|h| length(mesh, topology, h));
-            edges[topology.component[face.index()] as usize].extend(lengths);
+            edges[topology.component(face) as usize].extend(lengths);
         }
         Search {
             areas: face_areas(mesh),
@@ -100,7 +100,7 @@ impl<'a> Search<'a> {
 
     /// The longest side of a face in median edges of its component.
     fn size(&self, face: FaceId) -> f64 {
-        let median = self.medians[self.topology.component[face.index()] as usize];
+        let median = self.medians[self.topology.component(face) as usize];
         self.longest(face) / median
     }
 
@@ -169,7 +169,7 @@ impl<'a> Search<'a> {
             )
         };
         let (edge, edge_around) = (edges(&group), edges(&around));
-        let component = topology.component[group.first()?.index()] as usize;
+        let component = topology.component(*group.first()?) as usize;
         let area: f64 = group.iter().map(|f| self.areas[f.index()]).sum();
         let face_around = median(around.iter().map(|f| self.areas[f.index()]).collect());
         let is_one = edge > COARSER * edge_around

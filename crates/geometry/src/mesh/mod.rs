@@ -83,15 +83,20 @@ impl TriMesh {
 
     /// The interior angle at `corner` (0..3) of a face, radians in `[0, π]`; 0 for a corner with a zero-length side.
     pub fn corner_angle(&self, face: usize, corner: usize) -> f64 {
-        let p = self.triangle(face);
-        let (a, b) = (
-            p[(corner + 1) % 3] - p[corner],
-            p[(corner + 2) % 3] - p[corner],
-        );
-        let unit = unit_for(a.amax().max(b.amax()));
-        let (a, b) = (a / unit, b / unit);
-        a.cross(&b).norm().atan2(a.dot(&b))
+        corner_angle(self.triangle(face), corner)
     }
+}
+
+/// The interior angle at `corner` (0..3) of a triangle, radians in `[0, π]`; 0 for a corner with a zero-length side.
+fn corner_angle(triangle: [Vec3; 3], corner: usize) -> f64 {
+    let at = triangle[corner];
+    let (a, b) = (
+        triangle[(corner + 1) % 3] - at,
+        triangle[(corner + 2) % 3] - at,
+    );
+    let unit = unit_for(a.amax().max(b.amax()));
+    let (a, b) = (a / unit, b / unit);
+    a.cross(&b).norm().atan2(a.dot(&b))
 }
 
 /// A unit for lengths of this size, so that their products neither overflow nor underflow: 1 for all sizes but

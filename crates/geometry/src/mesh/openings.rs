@@ -11,6 +11,7 @@ use super::TriMesh;
 use rayon::prelude::*;
 
 use super::curvature::face_area;
+use super::index::FaceId;
 use super::loops::{BoundaryLoop, LoopKind};
 use super::topology::Topology;
 use super::turning::vertex_turnings;
@@ -127,17 +128,20 @@ const PART: usize = 1 << 14;
 
 /// Per component its area, scene units squared; the same with any number of threads.
 fn component_areas(mesh: &TriMesh, topology: &Topology) -> Vec<f64> {
-    let parts = topology.component.par_chunks(PART).enumerate();
+    let faces = mesh.faces.len();
+    let parts = (0..faces.div_ceil(PART)).into_par_iter();
     // The sums of runs of faces of the same component.
-    let sums = parts.map(|(part, components)| {
-        let mut face = part * PART;
-        let runs = components.chunk_by(|a, b| a == b);
-        let sum = |run: &[u32]| {
-            let faces = face..face + run.len();
-            face = faces.end;
-            (run[0], faces.map(|f| face_area(mesh, f)).sum())
-        };
-        runs.map(sum).collect::<Vec<(u32, f64)>>()
+    let sums = parts.map(|part| {
+        let mut runs: Vec<(u32, f64)> = Vec::new();
+        for face in PART * part..faces.min(PART * (part + 1)) {
+            let component = topology.component(FaceId(face as u32));
+            let area = face_area(mesh, face);
+            match runs.last_mut().filter(|(last, _)| *last == component) {
+                Some((_, sum)) => *sum += area,
+                None => runs.push((component, area)),
+            }
+        }
+        runs
     });
     let mut areas = vec![0.0; topology.components];
     for (component, area) in sums.collect::<Vec<_>>().into_iter().flatten() {

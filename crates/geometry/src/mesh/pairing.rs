@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::TriMesh;
 use super::index::{HalfEdgeId, VertexId};
+use super::sparse::SparseValues;
 
 /// "No twin".
 const NONE: HalfEdgeId = HalfEdgeId(u32::MAX);
@@ -67,7 +68,7 @@ pub(super) trait Paired {
     /// The boundary as cycles of half-edges, each from its smallest vertex on; `origin` is the vertex a half-edge
     /// starts from.
     fn boundary_cycles(&self, origin: impl Fn(HalfEdgeId) -> VertexId) -> Vec<Vec<HalfEdgeId>> {
-        let mut seen = vec![false; self.half_edges()];
+        let mut seen = SparseValues::new(self.half_edges(), false);
         let mut cycles = Vec::new();
         for first in self.boundary() {
             let mut cycle = Vec::new();
@@ -241,7 +242,7 @@ pub(super) fn corners_by_vertex(origins: &[u32], vertices: usize) -> Buckets<Hal
 }
 
 /// Values in buckets.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(super) struct Buckets<T> {
     /// Where each bucket starts, and where the last ends.
     starts: Vec<u32>,

@@ -259,6 +259,8 @@ pub(crate) fn region_around_hole(mesh: &TriMesh, reach: f64) -> Region {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use proptest::prelude::*;
 
     use super::*;
@@ -269,7 +271,7 @@ mod tests {
     use crate::mesh::weld::weld;
 
     struct Whole {
-        mesh: TriMesh,
+        mesh: Arc<TriMesh>,
         topology: Topology,
         loops: Vec<BoundaryLoop>,
     }

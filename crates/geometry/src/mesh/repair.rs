@@ -15,7 +15,7 @@ use super::index::{FaceId, HalfEdgeId};
 use super::joints::{Joints, joints, turned_half_edge, turning};
 use super::pairing::{Paired, Pairing, Twins, pair_half_edges};
 use super::topology::face_components;
-use super::weld::SetAside;
+use super::weld::{SetAside, SoupFaces};
 
 /// Faces that a fin may have.
 const MAX_FIN: usize = 8;
@@ -29,9 +29,9 @@ type Places<'a> = Cow<'a, [[u32; 3]]>;
 /// Faces that lead back to those of a soup.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Sources {
-    /// Per face the soup's face, ascending; the parts of a split face have the same.
-    pub soup_face: Vec<u32>,
-    /// Per face whether a face left out shows its other side.
+    /// Which faces of the soup they are.
+    pub soup_faces: SoupFaces,
+    /// Per face whether a face left out shows its other side; empty where none does.
     pub two_sided: Vec<bool>,
 }
 
@@ -79,7 +79,7 @@ impl Repair<'_> {
     pub fn joined(&self) -> Result<Repaired<'_>, Exhausted> {
         let mut sources = self.proper_faces();
         let mut set_aside = SetAside {
-            degenerate_faces: self.soup.faces.len() - sources.soup_face.len(),
+            degenerate_faces: self.soup.faces.len() - sources.soup_faces.len(),
             ..SetAside::default()
         };
         let mut places = self.places_of(&sources);
@@ -115,9 +115,9 @@ impl Repair<'_> {
         }
         drop(pairing);
         self.budget.spend_at_once(FACE_WORK * places.len() as u64)?;
-        let soup_faces = sources.soup_face.iter();
+        let soup_faces = sources.soup_faces.iter();
         let mut faces = Working {
-            corners: soup_faces.map(|&f| self.soup.faces[f as usize]).collect(),
+            corners: soup_faces.map(|f| self.soup.faces[f as usize]).collect(),
             sources,
         };
         let mut place = self.exact.to_vec();
@@ -145,28 +145,31 @@ impl Repair<'_> {
             [Some(a), Some(b), Some(c)] => a != b && b != c && c != a,
             _ => false,
         };
-        let faces = (0u32..).zip(&self.soup.faces);
-        let soup_face: Vec<u32> = faces
-            .filter(|(_, face)| is_proper(face))
-            .map(|(f, _)| f)
-            .collect();
+        let all = &self.soup.faces;
+        let soup_faces = match all.iter().all(is_proper) {
+            true => SoupFaces::Same(all.len()),
+            false => {
+                let proper = (0u32..).zip(all).filter(|(_, face)| is_proper(face));
+                SoupFaces::Listed(proper.map(|(f, _)| f).collect())
+            }
+        };
         Sources {
-            two_sided: vec![false; soup_face.len()],
-            soup_face,
+            soup_faces,
+            two_sided: Vec::new(),
         }
     }
 
     /// The soup's faces by exact places.
     fn places_of(&self, sources: &Sources) -> Places<'_> {
         let is_own_place = |(v, place): (u32, &u32)| v == *place;
-        let all = sources.soup_face.len() == self.soup.faces.len();
+        let all = sources.soup_faces.len() == self.soup.faces.len();
         if all && (0u32..).zip(self.exact).all(is_own_place) {
             return Cow::Borrowed(&self.soup.faces);
         }
-        let soup_faces = sources.soup_face.iter();
+        let soup_faces = sources.soup_faces.iter();
         let place = |v: u32| self.exact[v as usize];
         soup_faces
-            .map(|&f| self.soup.faces[f as usize].map(place))
+            .map(|f| self.soup.faces[f as usize].map(place))
             .collect()
     }
 
@@ -176,7 +179,7 @@ impl Repair<'_> {
         left_out: &[FaceId],
         sources: Sources,
     ) -> Result<(Sources, Places<'_>), Exhausted> {
-        let faces = sources.soup_face.len();
+        let faces = sources.soup_faces.len();
         self.budget.spend_at_once(FACE_WORK * faces as u64)?;
         let sources = sources.only(|f| left_out.binary_search(&FaceId(f as u32)).is_err());
         let places = self.places_of(&sources);
@@ -264,8 +267,9 @@ impl Repair<'_> {
         let (twins, non_manifold) = without(&is_fin, &twins, &crowded);
         let faces = faces.only(|f| !is_fin[f]);
         let unlike = |(f, corners): (u32, &[u32; 3])| {
-            let own = self.soup.faces[faces.sources.soup_face[f as usize] as usize];
-            (own != *corners).then_some((FaceId(f), *corners))
+            let own = faces.sources.soup_faces.of(FaceId(f))?;
+            let is_same = self.soup.faces[own as usize] == *corners;
+            (!is_same).then_some((FaceId(f), *corners))
         };
         Ok(Repaired {
             places: placed(&faces.corners, self.exact).into(),
@@ -280,7 +284,7 @@ impl Repair<'_> {
 
 /// The faces that have the three places of an earlier one, ascending; marks those that are kept and have a copy which
 /// shows the other side.
-fn duplicates(places: &[[u32; 3]], pairing: &Pairing, two_sided: &mut [bool]) -> Vec<FaceId> {
+fn duplicates(places: &[[u32; 3]], pairing: &Pairing, two_sided: &mut Vec<bool>) -> Vec<FaceId> {
     // Two faces with the same places share three edges: each of these has no pair, or is a pair of the two.
     let may_be = |f: FaceId| {
         let [g, h, _] = f
@@ -310,8 +314,10 @@ fn duplicates(places: &[[u32; 3]], pairing: &Pairing, two_sided: &mut [bool]) ->
     let mut found = Vec::new();
     for group in candidates.chunk_by(|x, y| x.0 == y.0) {
         let (kept, copies) = (group[0].1, &group[1..]);
-        two_sided[kept.index()] =
-            (copies.iter()).any(|c| ascends_twice(c.1) != ascends_twice(kept));
+        if (copies.iter()).any(|c| ascends_twice(c.1) != ascends_twice(kept)) {
+            two_sided.resize(places.len(), false);
+            two_sided[kept.index()] = true;
+        }
         found.extend(copies.iter().map(|copy| copy.1));
     }
     found.sort_unstable();
@@ -371,14 +377,14 @@ impl Sources {
     /// The faces whose indices pass a test.
     fn only(self, test: impl Fn(usize) -> bool) -> Sources {
         Sources {
-            soup_face: filtered(self.soup_face, &test),
+            soup_faces: SoupFaces::Listed(filtered(self.soup_faces.iter(), &test)),
             two_sided: filtered(self.two_sided, &test),
         }
     }
 }
 
 /// The values whose indices pass a test.
-fn filtered<T>(values: Vec<T>, test: impl Fn(usize) -> bool) -> Vec<T> {
+fn filtered<T>(values: impl IntoIterator<Item = T>, test: impl Fn(usize) -> bool) -> Vec<T> {
     let each = values.into_iter().enumerate();
     each.filter(|(f, _)| test(*f))
         .map(|(_, value)| value)
@@ -396,7 +402,8 @@ impl Working {
 
     /// Splits faces at the vertices on their edges; `junctions` are in the order of edges, and along each.
     fn split(self, junctions: &[Junction]) -> Working {
-        let mut out = Working::default();
+        let mut out = Vec::new();
+        let (mut soup_faces, mut two_sided) = (Vec::new(), Vec::new());
         let mut by_face = junctions.chunk_by(|x, y| x.half_edge.face() == y.half_edge.face());
         let mut next = by_face.next();
         for (f, corners) in (0u32..).zip(self.corners) {
@@ -408,18 +415,19 @@ impl Working {
                 }
                 None => vec![corners],
             };
-            let (own, out_sources) = (&self.sources, &mut out.sources);
-            let soup_face = own.soup_face[f as usize];
-            let two_sided = own.two_sided[f as usize];
-            out_sources
-                .soup_face
-                .extend(parts.iter().map(|_| soup_face));
-            out_sources
-                .two_sided
-                .extend(parts.iter().map(|_| two_sided));
-            out.corners.extend(parts);
+            let own = self.sources.soup_faces.of(FaceId(f));
+            soup_faces.extend(parts.iter().filter_map(|_| own));
+            let is_two_sided = self.sources.two_sided.get(f as usize);
+            two_sided.extend(parts.iter().filter_map(|_| is_two_sided));
+            out.extend(parts);
         }
-        out
+        Working {
+            corners: out,
+            sources: Sources {
+                soup_faces: SoupFaces::Listed(soup_faces),
+                two_sided,
+            },
+        }
     }
 }
 

@@ -57,7 +57,7 @@ pub fn spikes(
     let long = LONG * median;
     let mut found = Vec::new();
     for (to, v) in rim.vertices.iter().enumerate() {
-        for &neck in topology.leaving(*v) {
+        for neck in topology.leaving(*v) {
             steps.take(STEP_WORK)?;
             // The piece lies left of the neck, which runs from the end of its stretch of the rim to the start.
             let from = match index.get(&topology.target(neck)) {
@@ -133,9 +133,9 @@ fn is_cloth(mesh: &TriMesh, topology: &Topology, piece: &[FaceId], median: f64) 
 fn median_edge(mesh: &TriMesh, topology: &Topology, rim: &BoundaryLoop) -> f64 {
     let place = |v: VertexId| mesh.positions[v.index()];
     let inner = rim.vertices.iter().flat_map(|v| topology.leaving(*v));
-    let inner = inner.filter(|h| topology.twin(**h).is_some());
+    let inner = inner.filter(|h| topology.twin(*h).is_some());
     let mut edges: Vec<f64> = inner
-        .map(|h| (place(topology.target(*h)) - place(topology.origin(*h))).norm())
+        .map(|h| (place(topology.target(h)) - place(topology.origin(h))).norm())
         .collect();
     let middle = edges.len() / 2;
     if edges.is_empty() {

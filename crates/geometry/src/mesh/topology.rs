@@ -4,26 +4,50 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use smallvec::SmallVec;
+
 use super::TriMesh;
 use super::index::{FaceId, HalfEdgeId, VertexId};
 use super::pairing::{Buckets, Paired, Twins, corners_by_vertex, pair_half_edges, places};
 
 /// How the faces of a mesh are connected.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Topology {
     /// Boundary half-edges, ascending, that share both ends with faces they were not joined to: three or more faces at
     /// one edge, or two that cannot face the same way.
     pub non_manifold: Vec<HalfEdgeId>,
-    /// Per face the edge-connected component it belongs to, numbered by first face.
-    pub component: Arc<Vec<u32>>,
-    /// How many components there are.
+    /// How many edge-connected components there are.
     pub components: usize,
+    /// Per face its component; empty where all faces are of one.
+    component: Arc<Vec<u32>>,
     twins: Arc<Twins>,
-    origins: Arc<Vec<u32>>,
-    /// Per vertex the half-edges that leave it, ascending.
-    leaving: Arc<Buckets<HalfEdgeId>>,
+    /// The mesh, for its faces alone.
+    mesh: Arc<TriMesh>,
+    leaving: Arc<Leaving>,
     /// What it does not have.
     without: Without,
+}
+
+/// The half-edges that leave each vertex.
+#[derive(Debug)]
+enum Leaving {
+    /// All of them, ascending.
+    All(Buckets<HalfEdgeId>),
+    /// The first; twins lead from it to the others, since the faces at a vertex are one fan.
+    First(Arc<Vec<HalfEdgeId>>),
+}
+
+/// The half-edges that leave a vertex; most vertices have six.
+pub type LeavingHalfEdges = SmallVec<[HalfEdgeId; 8]>;
+
+/// What welding knows of a mesh's topology.
+pub(super) struct Fans {
+    /// The twins of its half-edges.
+    pub twins: Arc<Twins>,
+    /// Per vertex the first half-edge that leaves it. The faces at a vertex are one fan.
+    pub first: Arc<Vec<HalfEdgeId>>,
+    /// What [`Topology::non_manifold`] lists.
+    pub non_manifold: Vec<HalfEdgeId>,
 }
 
 /// Faces that a topology does not have.
@@ -54,29 +78,46 @@ impl Topology {
     /// When a face names a vertex that does not exist.
     pub fn new(mesh: &TriMesh) -> Self {
         let pairing = pair_half_edges(&mesh.faces, &places(mesh));
-        Self::with_twins(mesh, pairing.twins.into(), pairing.non_manifold)
+        let origins = mesh.faces.as_flattened();
+        let leaving = corners_by_vertex(origins, mesh.positions.len());
+        let faces_alone = TriMesh {
+            positions: Vec::new(),
+            faces: mesh.faces.clone(),
+        };
+        Self {
+            leaving: Leaving::All(leaving).into(),
+            ..Self::with_fans(
+                faces_alone.into(),
+                Fans {
+                    twins: pairing.twins.into(),
+                    first: Arc::default(),
+                    non_manifold: pairing.non_manifold,
+                },
+            )
+        }
     }
 
-    /// The topology of faces whose half-edges are paired already.
-    pub(super) fn with_twins(
-        mesh: &TriMesh,
-        twins: Arc<Twins>,
-        non_manifold: Vec<HalfEdgeId>,
-    ) -> Self {
-        let origins = mesh.faces.as_flattened().to_vec();
-        let ((component, components), leaving) = rayon::join(
-            || face_components(&*twins),
-            || corners_by_vertex(&origins, mesh.positions.len()),
-        );
+    /// The topology of a welded mesh, which it shares.
+    pub(super) fn with_fans(mesh: Arc<TriMesh>, fans: Fans) -> Self {
+        let (mut component, components) = face_components(&*fans.twins);
+        if components <= 1 {
+            component = Vec::new();
+        }
         Self {
-            non_manifold,
+            non_manifold: fans.non_manifold,
             component: component.into(),
             components,
-            twins,
-            origins: origins.into(),
-            leaving: leaving.into(),
+            twins: fans.twins,
+            mesh,
+            leaving: Leaving::First(fans.first).into(),
             without: Without::default(),
         }
+    }
+
+    /// The edge-connected component that a face belongs to; components are numbered by first face.
+    #[inline]
+    pub fn component(&self, face: FaceId) -> u32 {
+        self.component.get(face.index()).copied().unwrap_or(0)
     }
 
     /// The half-edge across the edge of `half_edge`; `None` on the boundary.
@@ -90,7 +131,7 @@ impl Topology {
     /// The vertex `half_edge` starts from.
     #[inline]
     pub fn origin(&self, half_edge: HalfEdgeId) -> VertexId {
-        VertexId(self.origins[half_edge.index()])
+        VertexId(self.mesh.faces[half_edge.face().index()][half_edge.corner()])
     }
 
     /// The vertex `half_edge` runs to.
@@ -100,22 +141,43 @@ impl Topology {
     }
 
     /// The half-edges that leave `vertex`, one per face at it, in face order (not in cyclic order).
-    #[inline]
-    pub fn leaving(&self, vertex: VertexId) -> &[HalfEdgeId] {
+    pub fn leaving(&self, vertex: VertexId) -> LeavingHalfEdges {
         match self.without.leaving.get(&vertex) {
-            Some(leaving) => leaving,
-            None => self.leaving.get(vertex.index()),
+            Some(leaving) => SmallVec::from_slice(leaving),
+            None => self.leaving_whole(vertex),
         }
+    }
+
+    /// The half-edges that leave a vertex of the mesh with all its faces.
+    fn leaving_whole(&self, vertex: VertexId) -> LeavingHalfEdges {
+        let first = match &*self.leaving {
+            Leaving::All(all) => return SmallVec::from_slice(all.get(vertex.index())),
+            Leaving::First(first) => first[vertex.index()],
+        };
+        let mut fan = SmallVec::from_slice(&[first]);
+        let on = |h: HalfEdgeId| self.twins.twin(h).map(HalfEdgeId::next);
+        let ahead = std::iter::successors(on(first), |h| on(*h));
+        fan.extend(ahead.take_while(|h| *h != first));
+        // A fan that ends on the boundary goes on in the other direction.
+        if fan.last().is_some_and(|last| on(*last).is_none()) {
+            let back = |h: HalfEdgeId| self.twins.twin(h.previous());
+            fan.extend(std::iter::successors(back(first), |h| back(*h)));
+        }
+        fan.sort_unstable();
+        fan
     }
 
     /// How many vertices the mesh has.
     pub(super) fn vertex_count(&self) -> usize {
-        self.leaving.len()
+        match &*self.leaving {
+            Leaving::All(all) => all.len(),
+            Leaving::First(first) => first.len(),
+        }
     }
 
     /// The faces at `vertex`, ascending.
-    pub fn faces_at(&self, vertex: VertexId) -> impl Iterator<Item = FaceId> {
-        self.leaving(vertex).iter().map(|h| h.face())
+    pub fn faces_at(&self, vertex: VertexId) -> impl Iterator<Item = FaceId> + use<> {
+        self.leaving(vertex).into_iter().map(HalfEdgeId::face)
     }
 
     /// The vertices joined to `vertex` by an edge, ascending, each once.
@@ -128,8 +190,8 @@ impl Topology {
 
     /// The two other vertices of every face at `vertex`, in face order; a vertex with two common faces comes twice.
     pub(super) fn face_neighbours(&self, vertex: VertexId) -> impl Iterator<Item = VertexId> {
-        let leaving = self.leaving(vertex).iter();
-        leaving.flat_map(|&h| [self.target(h), self.origin(h.previous())])
+        let leaving = self.leaving(vertex).into_iter();
+        leaving.flat_map(|h| [self.target(h), self.origin(h.previous())])
     }
 
     /// The same mesh as if it did not have the given faces, with the numbers of all others. Costs no pass over the mesh.
@@ -144,8 +206,8 @@ impl Topology {
         let corners = gone.iter().flat_map(|f| f.half_edges());
         let leaving = corners.map(|h| {
             let vertex = self.origin(h);
-            let others = self.leaving.get(vertex.index()).iter();
-            (vertex, others.copied().filter(kept).collect())
+            let others = self.leaving_whole(vertex).into_iter();
+            (vertex, others.filter(kept).collect())
         });
         let without = Without {
             leaving: leaving.collect(),
@@ -159,8 +221,15 @@ impl Topology {
 
     /// Per vertex whether it lies on a boundary (or on no face at all).
     pub fn boundary_vertices(&self) -> Vec<bool> {
-        let vertices = (0..self.vertex_count() as u32).map(VertexId);
-        let mut boundary: Vec<bool> = vertices.map(|v| self.leaving(v).is_empty()).collect();
+        let is_bare = |v: u32| match &*self.leaving {
+            Leaving::All(all) => all.get(v as usize).is_empty(),
+            Leaving::First(_) => false,
+        };
+        let gone = |v: u32| self.without.leaving.get(&VertexId(v)).map(Vec::is_empty);
+        let vertices = 0..self.vertex_count() as u32;
+        let mut boundary: Vec<bool> = vertices
+            .map(|v| gone(v).unwrap_or_else(|| is_bare(v)))
+            .collect();
         for h in self.boundary() {
             boundary[self.origin(h).index()] = true;
             boundary[self.target(h).index()] = true;

@@ -2,11 +2,12 @@
 
 use std::f64::consts::PI;
 
-use super::curvature::angle_defect;
+use super::curvature::{angle_defect, angle_defect_of};
 use super::index::{HalfEdgeId, LoopId, VertexId};
 use super::pairing::Paired;
+use super::sparse::SparseValues;
 use super::topology::Topology;
-use super::{TriMesh, Vec3};
+use super::{TriMesh, Vec3, corner_angle};
 
 /// How often positions are averaged before the turning of a rough edge is measured.
 const SMOOTHING: usize = 4;
@@ -52,12 +53,15 @@ pub(super) fn vertex_turnings(
     half_edges: &[HalfEdgeId],
 ) -> impl Iterator<Item = f64> {
     half_edges.iter().map(|&h| {
-        let fan = topology.fan_after(h);
-        let angles: f64 = fan
-            .map(|e| mesh.corner_angle(e.face().index(), e.corner()))
-            .sum();
-        PI - angles
+        turning_after(topology, h, |e| {
+            mesh.corner_angle(e.face().index(), e.corner())
+        })
     })
+}
+
+/// π less the angles of the faces at the end of a boundary half-edge; `angle` is that of a face where a half-edge starts.
+fn turning_after(topology: &Topology, h: HalfEdgeId, angle: impl Fn(HalfEdgeId) -> f64) -> f64 {
+    PI - topology.fan_after(h).map(angle).sum::<f64>()
 }
 
 /// A vertex some rings away from the boundary, and the loop it is nearest to: [`NO_LOOP`] when two are as near.
@@ -118,11 +122,13 @@ fn estimated_turnings(
     // ring more.
     let rings = rings(topology, boundary, SMOOTHING + LAST_RING);
     let near: Vec<VertexId> = rings.iter().flatten().map(|v| v.vertex).collect();
-    let smooth = smoothed(mesh, topology, &near);
-    let mut turnings: Vec<f64> = cycles
-        .iter()
-        .map(|c| turning(&smooth, topology, c))
-        .collect();
+    let smooth = Smoothed::of(mesh, topology, &near);
+    let angle = |h: HalfEdgeId| smooth.angle(h);
+    let turning = |cycle: &Vec<HalfEdgeId>| {
+        let each = cycle.iter();
+        each.map(|h| turning_after(topology, *h, angle)).sum()
+    };
+    let mut turnings: Vec<f64> = cycles.iter().map(turning).collect();
     for (depth, ring) in rings.iter().enumerate().skip(1).take(LAST_RING) {
         // The share of the curves that lie on this ring or behind it. By Gauss–Bonnet a curve turns by the boundary's
         // turning plus the angle defects between the two.
@@ -130,7 +136,7 @@ fn estimated_turnings(
             (LAST_RING + 1 - depth.max(FIRST_RING)) as f64 / (LAST_RING + 1 - FIRST_RING) as f64;
         for v in ring {
             if let Some(turning) = turnings.get_mut(v.nearest.index()) {
-                *turning += weight * angle_defect(&smooth, topology, v.vertex);
+                *turning += weight * angle_defect_of(topology, v.vertex, angle);
             }
         }
     }
@@ -169,39 +175,70 @@ fn rings(topology: &Topology, boundary: &[RingVertex], last: usize) -> Vec<Vec<R
     rings
 }
 
-/// The mesh with the vertices `near` the boundary averaged [`SMOOTHING`] times with their neighbours: boundary
-/// vertices along the boundary only, so that loops stay loops.
-fn smoothed(mesh: &TriMesh, topology: &Topology, near: &[VertexId]) -> TriMesh {
-    // The neighbours of every vertex in one list; `ends` tells where each vertex's end.
-    let (mut averaged, mut ends) = (Vec::new(), Vec::with_capacity(near.len()));
-    for &v in near {
-        let start = averaged.len();
-        for &h in topology.leaving(v) {
-            let back = h.previous();
-            let on_boundary = |h: HalfEdgeId| topology.twin(h).is_none();
-            averaged.extend(on_boundary(h).then(|| topology.target(h)));
-            averaged.extend(on_boundary(back).then(|| topology.origin(back)));
+/// A mesh some of whose vertices moved; holds no copy of the others.
+struct Smoothed<'a> {
+    mesh: &'a TriMesh,
+    /// Per vertex its place in `moved`, or [`UNMOVED`].
+    number: SparseValues<u32>,
+    moved: Vec<Vec3>,
+}
+
+/// "The vertex lies where the mesh has it."
+const UNMOVED: u32 = u32::MAX;
+
+impl<'a> Smoothed<'a> {
+    /// The mesh with the vertices `near` the boundary averaged [`SMOOTHING`] times with their neighbours: boundary
+    /// vertices along the boundary only, so that loops stay loops.
+    fn of(mesh: &'a TriMesh, topology: &Topology, near: &[VertexId]) -> Self {
+        // The neighbours of every vertex in one list; `ends` tells where each vertex's end.
+        let (mut averaged, mut ends) = (Vec::new(), Vec::with_capacity(near.len()));
+        for &v in near {
+            let start = averaged.len();
+            for h in topology.leaving(v) {
+                let back = h.previous();
+                let on_boundary = |h: HalfEdgeId| topology.twin(h).is_none();
+                averaged.extend(on_boundary(h).then(|| topology.target(h)));
+                averaged.extend(on_boundary(back).then(|| topology.origin(back)));
+            }
+            if averaged.len() == start {
+                averaged.extend(topology.neighbours(v));
+            }
+            ends.push(averaged.len());
         }
-        if averaged.len() == start {
-            averaged.extend(topology.neighbours(v));
+        let mut out = Smoothed {
+            mesh,
+            number: SparseValues::new(mesh.positions.len(), UNMOVED),
+            moved: near.iter().map(|v| mesh.positions[v.index()]).collect(),
+        };
+        for (number, v) in (0u32..).zip(near) {
+            out.number[v.index()] = number;
         }
-        ends.push(averaged.len());
+        for _ in 0..SMOOTHING {
+            let mut start = 0;
+            let averages = near.iter().zip(&ends).map(|(&v, &end)| {
+                let neighbours = &averaged[start..end];
+                start = end;
+                let sum: Vec3 = neighbours.iter().map(|n| out.position(n.0)).sum();
+                (out.position(v.0) + sum / neighbours.len() as f64) * 0.5
+            });
+            out.moved = averages.collect();
+        }
+        out
     }
-    let mut out = mesh.clone();
-    let mut moved = Vec::with_capacity(near.len());
-    for _ in 0..SMOOTHING {
-        let mut start = 0;
-        for (&v, &end) in near.iter().zip(&ends) {
-            let neighbours = &averaged[start..end];
-            let sum: Vec3 = neighbours.iter().map(|n| out.positions[n.index()]).sum();
-            moved.push((out.positions[v.index()] + sum / neighbours.len() as f64) * 0.5);
-            start = end;
-        }
-        for (&v, p) in near.iter().zip(moved.drain(..)) {
-            out.positions[v.index()] = p;
+
+    #[inline]
+    fn position(&self, vertex: u32) -> Vec3 {
+        match self.number[vertex as usize] {
+            UNMOVED => self.mesh.positions[vertex as usize],
+            number => self.moved[number as usize],
         }
     }
-    out
+
+    /// The angle of a face where one of its half-edges starts, radians.
+    fn angle(&self, h: HalfEdgeId) -> f64 {
+        let corners = self.mesh.faces[h.face().index()];
+        corner_angle(corners.map(|v| self.position(v)), h.corner())
+    }
 }
 
 #[cfg(test)]

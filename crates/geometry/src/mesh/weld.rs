@@ -8,26 +8,107 @@ use super::TriMesh;
 use super::index::{FaceId, HalfEdgeId};
 use super::pairing::{Paired, Twins, places};
 use super::repair::{Repair, Repaired};
-use super::topology::Topology;
+use super::topology::{Fans, Topology};
 
 /// A triangle soup made into surfaces, and how its faces lead back to the soup's.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct WeldedMesh {
     /// The welded mesh; vertices are numbered by first use in face order, none is unused.
-    pub mesh: TriMesh,
-    /// Per welded face the soup's face, ascending; the parts of a split face have the same. For their corners see
-    /// [`WeldedMesh::soup_corners`].
-    pub soup_face: Vec<u32>,
+    pub mesh: Arc<TriMesh>,
+    /// Which of the soup's faces the welded faces are. For their corners see [`WeldedMesh::soup_corners`].
+    pub soup_faces: SoupFaces,
     /// What the mesh does not have as the soup has it.
     pub set_aside: SetAside,
-    /// Per welded face whether one of the faces left out shows its other side.
-    pub two_sided: Vec<bool>,
+    /// Per welded face whether one of the faces left out shows its other side; empty where none does.
+    two_sided: Vec<bool>,
     /// The twins of the welded mesh's half-edges.
     twins: Arc<Twins>,
+    /// Per vertex the first half-edge that leaves it.
+    first_leaving: Arc<Vec<HalfEdgeId>>,
     /// What [`Topology::non_manifold`] lists.
     non_manifold: Vec<HalfEdgeId>,
     /// The faces that were turned or split, ascending, with the soup's vertices at their corners.
     changed: Vec<(FaceId, [u32; 3])>,
+}
+
+/// Per face of a welded mesh the face of the soup that it was made of, ascending; the parts of a split face have the same.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum SoupFaces {
+    /// So many welded faces, each with the number of its face in the soup.
+    Same(usize),
+    /// Other numbers.
+    Listed(Vec<u32>),
+}
+
+impl Default for SoupFaces {
+    fn default() -> Self {
+        SoupFaces::Same(0)
+    }
+}
+
+impl SoupFaces {
+    /// The same without a list where each of the soup's `count` faces is one welded face.
+    fn compact(self, count: usize) -> SoupFaces {
+        match self {
+            // Ascending numbers without repetition below their count are all of them.
+            SoupFaces::Listed(faces)
+                if faces.len() == count && faces.is_sorted_by(|a, b| a < b) =>
+            {
+                SoupFaces::Same(count)
+            }
+            faces => faces,
+        }
+    }
+
+    /// How many welded faces there are.
+    pub fn len(&self) -> usize {
+        match self {
+            SoupFaces::Same(count) => *count,
+            SoupFaces::Listed(faces) => faces.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The soup's face of a welded one; `None` for one that does not exist.
+    #[inline]
+    pub fn of(&self, face: FaceId) -> Option<u32> {
+        match self {
+            SoupFaces::Same(count) => (face.index() < *count).then_some(face.0),
+            SoupFaces::Listed(faces) => faces.get(face.index()).copied(),
+        }
+    }
+
+    /// The soup's faces in the order of the welded ones.
+    pub fn iter(&self) -> impl Iterator<Item = u32> + '_ {
+        (0..self.len() as u32).filter_map(|f| self.of(FaceId(f)))
+    }
+
+    /// The welded faces that were made of a face of the soup.
+    pub fn parts(&self, soup_face: u32) -> impl Iterator<Item = FaceId> + use<> {
+        let range = match self {
+            SoupFaces::Same(count) => {
+                let at = soup_face as usize;
+                at.min(*count)..(at + 1).min(*count)
+            }
+            SoupFaces::Listed(faces) => {
+                let first = faces.partition_point(|own| *own < soup_face);
+                first..faces.partition_point(|own| *own <= soup_face)
+            }
+        };
+        range.map(|part| FaceId(part as u32))
+    }
+
+    /// Bytes of memory that it holds.
+    pub fn bytes(&self) -> usize {
+        match self {
+            SoupFaces::Same(_) => 0,
+            SoupFaces::Listed(faces) => 4 * faces.len(),
+        }
+    }
 }
 
 /// How many things a welded mesh does not have as its soup has them, by kind.
@@ -51,13 +132,23 @@ pub struct SetAside {
 impl WeldedMesh {
     /// How the welded faces are connected. Two that share both ends of an edge may still be apart there: see [`weld`].
     pub fn topology(&self) -> Topology {
-        Topology::with_twins(&self.mesh, self.twins.clone(), self.non_manifold.clone())
+        let fans = Fans {
+            twins: self.twins.clone(),
+            first: self.first_leaving.clone(),
+            non_manifold: self.non_manifold.clone(),
+        };
+        Topology::with_fans(self.mesh.clone(), fans)
+    }
+
+    /// Whether one of the faces left out shows the other side of a welded face.
+    pub fn is_two_sided(&self, face: FaceId) -> bool {
+        self.two_sided.get(face.index()).copied().unwrap_or(false)
     }
 
     /// The vertices of `soup` at a welded face's corners, in the order of the welded face: those of its face in the
     /// soup, reversed where the face was turned. A part of a split face has vertices of other faces, too.
     pub fn soup_corners(&self, soup: &TriMesh, face: FaceId) -> Option<[u32; 3]> {
-        let own = *self.soup_face.get(face.index())?;
+        let own = self.soup_faces.of(face)?;
         match self
             .changed
             .binary_search_by_key(&face, |changed| changed.0)
@@ -114,18 +205,22 @@ pub fn weld_within(
     } = repair.joined()?;
     let (faces, vertices) = twins.corner_fans();
     let mut positions = Vec::with_capacity(vertices);
-    for (&vertex, &place) in faces.as_flattened().iter().zip(places.as_flattened()) {
+    let mut first_leaving = Vec::with_capacity(vertices);
+    let corners = faces.as_flattened().iter().zip(places.as_flattened());
+    for (h, (&vertex, &place)) in (0u32..).map(HalfEdgeId).zip(corners) {
         if vertex as usize == positions.len() {
             positions.push(soup.positions[place as usize]);
+            first_leaving.push(h);
         }
     }
     Ok(WeldedMesh {
-        mesh: TriMesh { positions, faces },
+        mesh: TriMesh { positions, faces }.into(),
         changed,
-        soup_face: sources.soup_face,
+        soup_faces: sources.soup_faces.compact(soup.faces.len()),
         set_aside,
         two_sided: sources.two_sided,
         twins: twins.into(),
+        first_leaving: first_leaving.into(),
         non_manifold,
     })
 }
@@ -135,6 +230,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::mesh::index::VertexId;
     use crate::mesh::shapes::{concat, explode, jitter, sheet, shuffle};
     use crate::mesh::{Vec3, loops};
 
@@ -177,15 +273,29 @@ mod tests {
             let both = concat(&soup, &shuffle(&soup, seed));
             for soup in [&soup, &explode(&soup), &both] {
                 let welded = weld(soup);
-                prop_assert_eq!(welded.topology(), Topology::new(&welded.mesh));
+                let (fans, paired) = (welded.topology(), Topology::new(&welded.mesh));
+                prop_assert_eq!(&fans.non_manifold, &paired.non_manifold);
+                prop_assert_eq!(fans.components, paired.components);
+                for face in (0..welded.mesh.faces.len() as u32).map(FaceId) {
+                    prop_assert_eq!(fans.component(face), paired.component(face));
+                    for h in face.half_edges() {
+                        prop_assert_eq!(fans.twin(h), paired.twin(h));
+                        prop_assert_eq!(fans.origin(h), paired.origin(h));
+                    }
+                }
+                for v in (0..welded.mesh.positions.len() as u32).map(VertexId) {
+                    prop_assert_eq!(fans.leaving(v), paired.leaving(v));
+                }
+                prop_assert_eq!(fans.boundary_vertices(), paired.boundary_vertices());
             }
         }
 
         #[test]
         fn corners_keep_their_places(soup in sheet_with_random_holes()) {
             let welded = weld(&soup);
-            for (f, &from) in welded.soup_face.iter().enumerate() {
+            for (f, from) in welded.soup_faces.iter().enumerate() {
                 prop_assert_eq!(welded.mesh.triangle(f), soup.triangle(from as usize));
+                prop_assert!(welded.soup_faces.parts(from).any(|part| part.index() == f));
             }
         }
 
@@ -216,8 +326,9 @@ mod tests {
         };
         let both = weld(&concat(&concat(&front, &back), &front));
         assert_eq!(both.mesh.faces.len(), front.faces.len());
-        let expected: Vec<bool> = (0..front.faces.len()).map(|k| k % 2 == 0).collect();
-        assert_eq!(both.two_sided, expected);
+        for k in 0..front.faces.len() {
+            assert_eq!(both.is_two_sided(FaceId(k as u32)), k % 2 == 0);
+        }
     }
 
     #[test]
@@ -241,7 +352,7 @@ mod tests {
             ],
         };
         let welded = weld(&soup);
-        assert_eq!(welded.soup_face, [0, 5]);
+        assert_eq!(welded.soup_faces, SoupFaces::Listed(vec![0, 5]));
         let left_out = SetAside {
             degenerate_faces: 2,
             duplicate_faces: 2,

@@ -54,7 +54,7 @@ proptest! {
         prop_assert_eq!(loops.len(), 3, "{:?}", welded.set_aside);
         prop_assert_eq!(described(&loops), described(&expected));
         // Every face is in the mesh or was counted.
-        let kept: BTreeSet<u32> = welded.soup_face.iter().copied().collect();
+        let kept: BTreeSet<u32> = welded.soup_faces.iter().collect();
         let aside = welded.set_aside;
         let left_out = aside.degenerate_faces + aside.duplicate_faces + aside.fins;
         prop_assert_eq!(kept.len() + left_out, soup.faces.len());

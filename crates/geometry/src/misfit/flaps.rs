@@ -257,6 +257,8 @@ impl Eq for Arrival {}
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use proptest::prelude::*;
 
     use super::*;
@@ -266,7 +268,7 @@ mod tests {
     use crate::mesh::shapes::{jitter, sheet, tongue, tongue_hinge};
     use crate::mesh::weld::weld;
 
-    fn flaps_of(soup: &TriMesh) -> (TriMesh, Vec<FaceId>) {
+    fn flaps_of(soup: &TriMesh) -> (Arc<TriMesh>, Vec<FaceId>) {
         let mesh = weld(soup).mesh;
         let region = region_around_hole(&mesh, 0.3);
         let chart =

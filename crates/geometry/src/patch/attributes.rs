@@ -413,7 +413,7 @@ mod tests {
         let plan = plan(&region, &chart, &options).unwrap();
         let patch = plan.patch(&chart, &filled, &[], &options).unwrap();
 
-        let source = |f: &FaceId| soup.faces[welded.soup_face[f.index()] as usize];
+        let source = |f: &FaceId| welded.soup_corners(soup, *f).expect("a face");
         let corners: Vec<Option<[u32; 3]>> = region.faces.iter().map(|f| Some(source(f))).collect();
         let mut any = vec![0; region.mesh.positions.len()];
         for (face, f) in region.mesh.faces.iter().zip(&region.faces) {

@@ -1,5 +1,7 @@
 //! Properties of whole patches.
 
+use std::sync::Arc;
+
 use super::*;
 use crate::flatten::{FlattenLimits, UvSquare, flatten};
 use crate::mesh::blocks::FaceBlocks;
@@ -181,7 +183,7 @@ fn a_patch_meets_a_moved_rim_and_avoids_a_layer_there() {
         centre + Vec3::new(x, y, 0.028 * bump - 0.02)
     };
     let layer = sheet(16, |_, _| true, bumpy);
-    let layer = weld(&layer).mesh;
+    let layer = Arc::unwrap_or_clone(weld(&layer).mesh);
     let cuts = |patch: &Patch| {
         let mut all = quality::joined(patch, &noisy);
         let own: Vec<u32> = (region.mesh.faces.len() as u32..all.faces.len() as u32).collect();

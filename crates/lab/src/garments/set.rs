@@ -12,6 +12,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Version of the generator: raised whenever the same seed gives other garments.
 pub const VERSION: u32 = 1;
@@ -245,7 +246,7 @@ pub fn read_mesh(path: &Path) -> Result<TriMesh, GarmentError> {
         source,
     })?;
     let scan = Scan::read(bytes, &ScanLimits::default()).map_err(|e| format_error(path, &e))?;
-    Ok(weld::weld(&scan.surface).mesh)
+    Ok(Arc::unwrap_or_clone(weld::weld(&scan.surface).mesh))
 }
 
 /// A mesh as GLB, with smooth normals.

@@ -52,11 +52,8 @@ pub fn continued(scan: &TestScan, peer: Peer) -> ContinuedPatch {
     let Ok(patch) = plan.patch(&chart, &vec![Vec3::zeros(); CELLS], &[], &options) else {
         return ContinuedPatch::default();
     };
-    let source = |f: usize| scan.mesh.faces[welded.soup_face[f] as usize];
-    let corners: Vec<Option<[u32; 3]>> = region
-        .faces
-        .iter()
-        .map(|f| Some(source(f.index())))
+    let corners: Vec<Option<[u32; 3]>> = (region.faces.iter())
+        .map(|f| welded.soup_corners(&scan.mesh, *f))
         .collect();
     let mut any = vec![0; region.mesh.positions.len()];
     for (face, corners) in region.mesh.faces.iter().zip(corners.iter().flatten()) {
