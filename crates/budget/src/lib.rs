@@ -34,6 +34,15 @@ pub enum Exhausted {
         /// Work allowed, in seconds of one core.
         seconds: f64,
     },
+    /// One part of the request, such as a hole, needs more work than its share of the request's.
+    #[error(
+        "it alone needs more than {seconds:.1} s of work, its share of what is allowed for the request's size; name it to \
+         let it have all, or send a scan with fewer triangles around it"
+    )]
+    Share {
+        /// Work allowed for the part, in seconds of one core.
+        seconds: f64,
+    },
     /// The request needs more memory than its size allows.
     #[error(
         "the request needs more than the {} MiB of memory that are allowed for its size; choose fewer holes at once by `holes`",
@@ -93,6 +102,8 @@ pub struct Budget<'a> {
     cancelled: &'a (dyn Fn() -> bool + Sync),
     spent: AtomicU64,
     held: AtomicUsize,
+    /// The budget of which this one is a share.
+    whole: Option<&'a Budget<'a>>,
 }
 
 /// A request without limits that is never cancelled.
@@ -108,6 +119,7 @@ static UNLIMITED: Budget<'static> = Budget {
     cancelled: &|| false,
     spent: AtomicU64::new(0),
     held: AtomicUsize::new(0),
+    whole: None,
 };
 
 impl<'a> Budget<'a> {
@@ -119,6 +131,23 @@ impl<'a> Budget<'a> {
             cancelled,
             spent: AtomicU64::new(0),
             held: AtomicUsize::new(0),
+            whole: None,
+        }
+    }
+
+    /// A budget for one part of the request, which may take at most so much work of it, in nanoseconds of one core. All that it takes and holds
+    /// counts for the request, too.
+    pub fn share(&self, work: u64) -> Budget<'_> {
+        Budget {
+            limits: Limits {
+                work,
+                deadline: self.limits.deadline,
+                ..Limits::default()
+            },
+            cancelled: self.cancelled,
+            spent: AtomicU64::new(0),
+            held: AtomicUsize::new(0),
+            whole: Some(self),
         }
     }
 
@@ -134,7 +163,10 @@ impl<'a> Budget<'a> {
 
     /// Begins a stage of the work that has so many pieces; 0 where it is one piece.
     pub fn begin(&self, stage: &'static str, pieces: usize) -> Stage<'_> {
-        Stage::begin(self.limits.listener.as_ref(), stage, pieces)
+        match self.whole {
+            Some(whole) => whole.begin(stage, pieces),
+            None => Stage::begin(self.limits.listener.as_ref(), stage, pieces),
+        }
     }
 
     /// Checks that the answer is still waited for.
@@ -142,6 +174,9 @@ impl<'a> Budget<'a> {
     /// # Errors
     /// `Cancelled`.
     pub fn check(&self) -> Result<(), Exhausted> {
+        if let Some(whole) = self.whole {
+            return whole.check();
+        }
         let late = self.limits.deadline.is_some_and(|at| Instant::now() >= at);
         if late || (self.cancelled)() {
             return Err(Exhausted::Cancelled);
@@ -153,24 +188,35 @@ impl<'a> Budget<'a> {
     /// known, or after each few thousand small ones ([`Steps`] counts those).
     ///
     /// # Errors
-    /// `Work`, `Cancelled`.
+    /// `Work`, or `Share` where this is the budget of a part; `Cancelled`.
     pub fn spend(&self, nanoseconds: u64) -> Result<(), Exhausted> {
         // Without a limit nothing is counted: the shared budget of commands would overflow in the end.
-        if self.limits.work != u64::MAX {
-            let before = self.spent.fetch_add(nanoseconds, Relaxed);
-            if before.saturating_add(nanoseconds) > self.limits.work {
-                return Err(Exhausted::Work {
+        let left = match self.limits.work {
+            u64::MAX => u64::MAX,
+            work => work.saturating_sub(self.spent.fetch_add(nanoseconds, Relaxed)),
+        };
+        let Some(whole) = self.whole else {
+            return match nanoseconds > left {
+                true => Err(Exhausted::Work {
                     seconds: self.limits.work as f64 / NANOSECONDS_PER_SECOND,
-                });
-            }
+                }),
+                false => self.check(),
+            };
+        };
+        // An exhausted part costs the request all of its share, whatever its threads were about to take.
+        whole.spend(nanoseconds.min(left))?;
+        match nanoseconds > left {
+            true => Err(Exhausted::Share {
+                seconds: self.limits.work as f64 / NANOSECONDS_PER_SECOND,
+            }),
+            false => Ok(()),
         }
-        self.check()
     }
 
     /// [`Budget::spend`] before a step that cannot be interrupted: ends the request at once when the step would end after the deadline.
     ///
     /// # Errors
-    /// `Work`, `Cancelled`.
+    /// As [`Budget::spend`].
     pub fn spend_at_once(&self, nanoseconds: u64) -> Result<(), Exhausted> {
         self.spend(nanoseconds)?;
         let end = self
@@ -183,6 +229,12 @@ impl<'a> Budget<'a> {
         }
     }
 
+    /// Work that may still be taken, in nanoseconds of one core; `None` without a limit.
+    pub fn work_left(&self) -> Option<u64> {
+        let limit = Some(self.limits.work).filter(|work| *work != u64::MAX);
+        limit.map(|work| work.saturating_sub(self.spent()))
+    }
+
     /// Work taken so far, in nanoseconds of one core; 0 without a limit.
     pub fn spent(&self) -> u64 {
         self.spent.load(Relaxed)
@@ -193,6 +245,9 @@ impl<'a> Budget<'a> {
     /// # Errors
     /// `Memory`, `MemoryFull`.
     pub fn hold(&self, bytes: usize) -> Result<(), Exhausted> {
+        if let Some(whole) = self.whole {
+            return whole.hold(bytes);
+        }
         if self.limits.memory == usize::MAX && self.limits.pool.is_none() {
             return Ok(());
         }
@@ -209,18 +264,27 @@ impl<'a> Budget<'a> {
         taken
     }
 
-    /// Bytes of memory counted now; 0 without limits.
+    /// Bytes of memory that the whole request holds now; 0 without limits.
     pub fn held(&self) -> usize {
-        self.held.load(Relaxed)
+        match self.whole {
+            Some(whole) => whole.held(),
+            None => self.held.load(Relaxed),
+        }
     }
 
     /// Bytes that this request may still hold, whatever other requests hold.
     pub fn memory_left(&self) -> usize {
-        self.limits.memory.saturating_sub(self.held())
+        match self.whole {
+            Some(whole) => whole.memory_left(),
+            None => self.limits.memory.saturating_sub(self.held()),
+        }
     }
 
     /// Gives back memory counted by [`Budget::hold`].
     pub fn release(&self, bytes: usize) {
+        if let Some(whole) = self.whole {
+            return whole.release(bytes);
+        }
         if self.limits.memory == usize::MAX && self.limits.pool.is_none() {
             return;
         }
@@ -236,6 +300,9 @@ impl<'a> Budget<'a> {
     /// # Errors
     /// `Output`.
     pub fn check_output(&self, bytes: usize) -> Result<(), Exhausted> {
+        if let Some(whole) = self.whole {
+            return whole.check_output(bytes);
+        }
         let limit = self.limits.output;
         if bytes > limit {
             return Err(Exhausted::Output { limit });
@@ -340,6 +407,44 @@ mod tests {
         assert_eq!(pool.used(), 40);
         drop(second);
         assert_eq!(pool.used(), 0);
+    }
+
+    #[test]
+    fn what_a_share_takes_counts_for_the_request_and_no_more_than_the_share() {
+        let limits = Limits {
+            work: 100,
+            memory: 50,
+            ..Limits::default()
+        };
+        let whole = budget(limits);
+        let part = whole.share(30);
+        assert_eq!(part.spend(20), Ok(()));
+        let seconds = 30.0 / NANOSECONDS_PER_SECOND;
+        assert_eq!(part.spend(20), Err(Exhausted::Share { seconds }));
+        assert_eq!(part.spend(1), Err(Exhausted::Share { seconds }));
+        assert_eq!(whole.spent(), 30, "the share and no more");
+        assert_eq!(whole.share(30).spend(30), Ok(()));
+        let seconds = 100.0 / NANOSECONDS_PER_SECOND;
+        let last = whole.share(60);
+        assert_eq!(last.spend(50), Err(Exhausted::Work { seconds }));
+        assert_eq!(part.hold(40), Ok(()));
+        assert_eq!((whole.held(), last.memory_left()), (40, 10));
+        assert_eq!(last.hold(20), Err(Exhausted::Memory { limit: 50 }));
+        drop(part);
+        assert_eq!(whole.held(), 40, "what a part made stays");
+        last.release(40);
+        assert_eq!(whole.held(), 0);
+    }
+
+    #[test]
+    fn a_share_ends_with_the_request() {
+        let left = Budget::new(Limits::default(), &|| true);
+        assert_eq!(left.share(10).check(), Err(Exhausted::Cancelled));
+        let past = budget(Limits {
+            deadline: Some(Instant::now()),
+            ..Limits::default()
+        });
+        assert_eq!(past.share(10).spend(1), Err(Exhausted::Cancelled));
     }
 
     #[test]

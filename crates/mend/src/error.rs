@@ -99,6 +99,14 @@ pub enum MendError {
         /// What was measured of the patch.
         patch: Box<v1::PatchReport>,
     },
+    /// The hole needs more work than one of several may take.
+    #[error("hole {hole}: {source}")]
+    Costly {
+        /// Id of the hole's loop.
+        hole: u32,
+        /// Its share.
+        source: Exhausted,
+    },
     /// No hole could be filled, and there are several.
     #[error("none of the {holes} holes could be filled; {first}")]
     NoneFilled {
@@ -145,7 +153,7 @@ pub fn reading_code(error: &ScanError) -> Code {
 
 fn exhausted_code(exhausted: &Exhausted) -> Code {
     match exhausted {
-        Exhausted::Work { .. } => codes::TOO_MUCH_WORK,
+        Exhausted::Work { .. } | Exhausted::Share { .. } => codes::TOO_MUCH_WORK,
         Exhausted::Memory { .. } => codes::TOO_MUCH_MEMORY,
         Exhausted::MemoryFull { .. } => codes::MEMORY_FULL,
         Exhausted::Output { .. } => codes::ANSWER_TOO_LARGE,
@@ -222,7 +230,10 @@ impl MendError {
             MendError::NoCells { .. } => codes::HOLE_TOO_NARROW,
             MendError::NoPlausibleFill { .. } => codes::NO_PLAUSIBLE_FILL,
             MendError::NoneFilled { first, .. } => first.code(),
-            MendError::Exhausted(exhausted) => exhausted_code(exhausted),
+            MendError::Exhausted(exhausted)
+            | MendError::Costly {
+                source: exhausted, ..
+            } => exhausted_code(exhausted),
             MendError::Net(_) | MendError::Scan(_) | MendError::Picture(_) => codes::INTERNAL,
         }
     }
@@ -236,6 +247,7 @@ impl MendError {
             | MendError::TooLittleKnown { hole, .. }
             | MendError::NoCells { hole }
             | MendError::Patch { hole, .. }
+            | MendError::Costly { hole, .. }
             | MendError::NoPlausibleFill { hole, .. } => Some(*hole),
             _ => None,
         }

@@ -36,6 +36,7 @@ mod formed_scan;
 mod hem_strip;
 mod hole;
 mod hole_report;
+mod hole_share;
 mod inpainter;
 mod islands;
 mod laid_cloth;
@@ -205,7 +206,8 @@ const LOOP_WORK: u64 = 3000;
 #[cfg(test)]
 mod tests {
     use darn_budget::{Exhausted, Limits};
-    use darn_geometry::mesh::shapes::{jitter, sheet};
+    use darn_contract::HoleSelector;
+    use darn_geometry::mesh::shapes::{concat, holed_sheet, jitter, sheet};
     use darn_geometry::mesh::{TriMesh, Vec3};
 
     use super::*;
@@ -266,6 +268,48 @@ mod tests {
         ));
         assert_eq!(error.code(), darn_contract::codes::TOO_MUCH_WORK);
         assert_eq!(work(&scan, u64::MAX - 1).0, all);
+    }
+
+    #[test]
+    fn a_hole_that_needs_too_much_of_the_work_leaves_the_others_to_be_filled() {
+        let mut sound = holed_sheet(24, 0.15);
+        sound.positions.iter_mut().for_each(|p| p.x += 400.0);
+        let scan = scan_of(&concat(&tangle(16), &sound));
+        let mended = |constraints: &Constraints, limit: u64| {
+            let limits = Limits {
+                work: limit,
+                ..Limits::default()
+            };
+            let budget = Budget::new(limits, &|| false);
+            let call = Call {
+                mender: mender(),
+                budget: &budget,
+            };
+            mend(&scan, constraints, call).map(|mended| mended.report)
+        };
+        let (all, _) = work(&scan, u64::MAX - 1);
+        let report = mended(&Constraints::default(), all / 10 * 9).expect("a mended scan");
+        let filled: Vec<u32> = report.holes.iter().map(|hole| hole.id).collect();
+        let left = report.skipped.iter();
+        let left: Vec<_> = left.filter(|it| it.code == "too_much_work").collect();
+        let ([_], [left]) = (&filled[..], &left[..]) else {
+            panic!("{filled:?} {:?}", report.skipped);
+        };
+        assert!(
+            left.reason.contains("s of work, its share"),
+            "{}",
+            left.reason
+        );
+        // One that is named may take all, and refuses the request where that is too little.
+        let named = Constraints {
+            holes: vec![HoleSelector::Id(left.id)],
+            ..Constraints::default()
+        };
+        let refused = mended(&named, all / 3).expect_err("a refusal");
+        assert!(matches!(
+            refused,
+            MendError::Exhausted(Exhausted::Work { .. })
+        ));
     }
 
     #[test]

@@ -14,6 +14,7 @@ use crate::cut::CutScan;
 use crate::error::MendError;
 use crate::fill_hole::PatchDraft;
 use crate::hole_report::FilledHole;
+use crate::hole_share::HoleShares;
 use crate::inpainter::Inpainter;
 use crate::mender::{Call, NetworkMender};
 use crate::prepared_hole::PreparedHole;
@@ -162,13 +163,16 @@ impl ScanHoles {
         let inpainter = Inpainter::choose(&call.mender.networks, weights, constraints.up)?;
         let started = Instant::now();
         let stage = call.budget.begin("flattening", found);
+        let shares = HoleShares::of(&selection.requests, call);
         let prepare = |request: &HoleRequest| {
             call.budget.check()?;
-            let hole = PreparedHole::new(&welded, request.id, call)?;
-            let hole = match selection.accept_doubtful || request.is_edited() {
-                true => hole,
-                false => hole.or_fair(&welded, &inpainter, call)?,
-            };
+            let hole = shares.within(request, |call| {
+                let hole = PreparedHole::new(&welded, request.id, call)?;
+                match selection.accept_doubtful || request.is_edited() {
+                    true => Ok(hole),
+                    false => hole.or_fair(&welded, &inpainter, call),
+                }
+            })?;
             stage.one_done();
             Ok(hole)
         };
@@ -301,7 +305,11 @@ impl ScanHoles {
             inpainter: &inpainter,
             pace: Pace::Anew,
         };
+        let shares = HoleShares::of(&selection.requests, call);
         let drafts = selection.requests.par_iter().map(|request| {
+            if let PreparedHole::Charted(hole) = self.opened(request.id)? {
+                shares.within(request, |call| hole.unedited(&inpainter, call))?;
+            }
             let draft = self.draft(request, filler, call)?;
             stage.one_done();
             match draft.reasons_to_leave() {
