@@ -11,15 +11,16 @@ use crate::select::{Entry, HoleRequest};
 use crate::welded_scan::WeldedScan;
 use darn_budget::Budget;
 use darn_contract::{Anchor, Edit, Gesture};
-use darn_geometry::mesh::TriMesh;
 use darn_geometry::mesh::loops::LoopKind;
 use darn_geometry::mesh::shapes::holed_sheet;
+use darn_geometry::mesh::{TriMesh, Vec3};
 use darn_gltf_scan::export::{NewMesh, glb};
 use darn_gltf_scan::{Scan, ScanLimits};
 use darn_net::{
     AnchorLoss, AnchorProblem, ErrorModel, GridPlanes, NetError, Network, Networks, Runtime,
     TrainingCard, UnetConfig, WeightsCard,
 };
+use serde_json::{Value, json};
 
 /// Where the loss of every anchor is least for [`PlateRuntime`].
 pub const BEST_UV: [f32; 2] = [0.55, 0.46];
@@ -91,6 +92,65 @@ pub fn scan_of(mesh: &TriMesh) -> Scan {
     };
     let bytes = glb(&fresh).expect("a small file");
     Scan::read(bytes.clone(), &ScanLimits::default()).expect("a readable scan")
+}
+
+/// Meshes as a scan of a node each, whose origin is given: positions are stored relative to it. Those that are not finite are stored, too.
+pub fn scan_of_tiles(tiles: &[(TriMesh, Vec3)]) -> Scan {
+    let mut bin: Vec<u8> = Vec::new();
+    let (mut views, mut accessors) = (Vec::new(), Vec::new());
+    let mut stored = |bytes: Vec<u8>, mut accessor: Value| {
+        views.push(json!({"buffer": 0, "byteOffset": bin.len(), "byteLength": bytes.len()}));
+        bin.extend(bytes);
+        accessor["bufferView"] = json!(accessors.len());
+        accessors.push(accessor);
+        accessors.len() - 1
+    };
+    let (mut meshes, mut nodes) = (Vec::new(), Vec::new());
+    for (mesh, origin) in tiles {
+        let each = mesh.positions.iter();
+        let local: Vec<[f32; 3]> = each.map(|p| (p - origin).cast().into()).collect();
+        let bound = |pick: fn(f32, f32) -> f32| {
+            [0, 1, 2].map(|k| {
+                let finite = local.iter().map(|p| p[k]).filter(|x| x.is_finite());
+                finite.reduce(pick).unwrap_or(0.0)
+            })
+        };
+        let (min, max) = (bound(f32::min), bound(f32::max));
+        let floats = local.iter().flatten();
+        let position = stored(
+            floats.flat_map(|x| x.to_le_bytes()).collect(),
+            json!({"componentType": 5126, "type": "VEC3", "count": local.len(), "min": min, "max": max}),
+        );
+        let corners = mesh.faces.iter().flatten();
+        let indices = stored(
+            corners.flat_map(|v| v.to_le_bytes()).collect(),
+            json!({"componentType": 5125, "type": "SCALAR", "count": 3 * mesh.faces.len()}),
+        );
+        nodes.push(json!({"mesh": meshes.len(), "translation": [origin.x, origin.y, origin.z]}));
+        let primitive = json!({"attributes": {"POSITION": position}, "indices": indices});
+        meshes.push(json!({"primitives": [primitive]}));
+    }
+    let document = json!({
+        "asset": {"version": "2.0"}, "scene": 0,
+        "scenes": [{"nodes": (0..nodes.len()).collect::<Vec<_>>()}],
+        "nodes": nodes, "meshes": meshes, "accessors": accessors, "bufferViews": views,
+        "buffers": [{"byteLength": bin.len()}],
+    });
+    let mut text = document.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let word = |number: usize| (number as u32).to_le_bytes();
+    let file: [&[u8]; 9] = [
+        b"glTF",
+        &word(2),
+        &word(28 + text.len() + bin.len()),
+        &word(text.len()),
+        b"JSON",
+        &text,
+        &word(bin.len()),
+        b"BIN\0",
+        &bin,
+    ];
+    Scan::read(file.concat(), &ScanLimits::default()).expect("a readable scan")
 }
 
 /// A round hole in a flat sheet; on the chart it is about a disk of radius ¼ in the middle.
