@@ -1,6 +1,6 @@
 //! Holes in tubes: sleeves with folds, cut open and laid flat; and what no chart can lay out.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use darn_budget::Budget;
@@ -156,4 +156,69 @@ fn a_session_holds_a_hole_without_a_chart() {
     let kept = session.call(never).mended(&opening).expect("a patch");
     let single = mended(&nearly_cut_through(), &opening).expect("a patch");
     assert!(kept.bytes == single.bytes);
+}
+
+/// A ball of radius 1 with lumps, the sum of six waves by a number, and a hole of about a third of its radius.
+fn lumpy_ball(seed: u64) -> TriMesh {
+    const RINGS: u32 = 24;
+    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let mut random = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        (state >> 33) as f64 / f64::from(1_u32 << 31)
+    };
+    let waves: Vec<(Vec3, f64)> = (0..6)
+        .map(|_| {
+            let along = [random(), random(), random()].map(|x| 18.0 * x - 9.0);
+            (Vec3::from(along), 6.0 * random())
+        })
+        .collect();
+    let direction = |k: u32| {
+        let (ring, place) = (f64::from(k / (2 * RINGS)), f64::from(k % (2 * RINGS)));
+        let polar = 0.02 + ring * (PI - 0.04) / f64::from(RINGS - 1);
+        let angle = place * PI / f64::from(RINGS);
+        let (sin, cos) = polar.sin_cos();
+        Vec3::new(sin * angle.cos(), sin * angle.sin(), cos)
+    };
+    let lump = |d: &Vec3| -> f64 {
+        waves
+            .iter()
+            .map(|(along, at)| (d.dot(along) + at).sin())
+            .sum()
+    };
+    let all: Vec<Vec3> = (0..RINGS * 2 * RINGS).map(direction).collect();
+    let quads = || (0..RINGS - 1).flat_map(|ring| (0..2 * RINGS).map(move |k| (ring, k)));
+    let vertex = |ring: u32, k: u32| ring * 2 * RINGS + k % (2 * RINGS);
+    let corners = |(ring, k)| {
+        let below = ring + 1;
+        [(ring, k), (below, k), (below, k + 1), (ring, k + 1)].map(|(r, k)| vertex(r, k))
+    };
+    let lower = quads().map(corners).map(|[a, b, c, _]| [a, b, c]);
+    let upper = quads().map(corners).map(|[a, _, c, d]| [a, c, d]);
+    let middle = |f: &[u32; 3]| f.iter().map(|v| all[*v as usize] / 3.0).sum::<Vec3>();
+    TriMesh {
+        faces: lower
+            .chain(upper)
+            .filter(|f| (middle(f) - Vec3::x()).norm() > 0.35)
+            .collect(),
+        positions: all.iter().map(|d| d * (1.0 + 0.12 * lump(d))).collect(),
+    }
+}
+
+#[test]
+fn where_a_surface_that_continues_the_cloth_is_a_tangle_a_plain_one_closes_the_hole() {
+    let done = mended(&packed(&lumpy_ball(39), &[]), &Constraints::default());
+    let report = done.expect("a ball").report;
+    let [hole] = &report.holes[..] else {
+        panic!("{:?}", report.skipped);
+    };
+    let patch = hole.patch.as_ref().expect("a patch");
+    assert_eq!(patch.method, "fair");
+    assert!(hole.doubts.is_empty(), "{:?}", hole.doubts);
+    assert!(
+        hole.notes[0].contains("no plausible cloth"),
+        "{:?}",
+        hole.notes
+    );
 }

@@ -17,7 +17,7 @@ use darn_geometry::mesh::denoise::denoise;
 use darn_geometry::mesh::index::LoopId;
 use darn_geometry::mesh::layers::Layers;
 use darn_geometry::mesh::region::{self, Region};
-use darn_geometry::patch::{FairPatch, Fairness, PatchWork};
+use darn_geometry::patch::{FairPatch, Fairness, PatchWork, Untangling};
 
 /// A hole without a chart, and the fair surface that closes it.
 pub struct FairHole {
@@ -46,6 +46,7 @@ impl FairHole {
         welded: &WeldedScan,
         id: u32,
         reason: String,
+        untangling: Untangling,
         call: Call,
     ) -> Result<FairHole, MendError> {
         let (started, budget) = (Instant::now(), call.budget);
@@ -75,12 +76,17 @@ impl FairHole {
             // No point of the patch is farther from the rim than this.
             let margin = fair.patch.beyond_rim();
             let layers = Layers::near(&whole, &welded.blocks, &region, margin, &[]);
-            Ok(fair.clear_of(&layers, margin, budget)?)
+            Ok(fair.clear_of(&layers, margin, untangling, budget)?)
         };
         let fair = match closed(Fairness::Curved) {
             Ok(curved) if curved.patch.crossings <= FEW_CUTS => curved,
-            // Cloth that is a tangle cuts any surface.
-            Ok(curved) if curved.patch.crossings > curved.patch.faces.len() => curved,
+            // Cloth that is a tangle cuts any surface. One that was not pushed apart may be tangled by its own curvature.
+            Ok(curved)
+                if untangling == Untangling::Always
+                    && curved.patch.crossings > curved.patch.faces.len() =>
+            {
+                curved
+            }
             Err(MendError::Exhausted(exhausted)) => return Err(exhausted.into()),
             curved => match (curved, closed(Fairness::Plain)) {
                 (_, Err(MendError::Exhausted(exhausted))) => return Err(exhausted.into()),

@@ -13,8 +13,8 @@ use crate::texture::HoleTextures;
 use crate::welded_scan::WeldedScan;
 use darn_geometry::mesh::TriMesh;
 use darn_geometry::mesh::region::{Region, RegionError};
-use darn_geometry::patch::Patch;
 use darn_geometry::patch::attributes::AttributeMap;
+use darn_geometry::patch::{Patch, Untangling};
 
 /// A hole ready to be filled.
 pub enum PreparedHole {
@@ -39,7 +39,7 @@ impl PreparedHole {
     /// # Errors
     /// Why it has no chart, when it can get no fair surface either; `Exhausted`.
     pub fn new(welded: &WeldedScan, id: u32, call: Call) -> Result<PreparedHole, MendError> {
-        let fair = |reason| FairHole::new(welded, id, reason, call);
+        let fair = |reason| FairHole::new(welded, id, reason, Untangling::Always, call);
         let boxed = |hole| PreparedHole::Fair(Box::new(hole));
         if !welded.loops[id as usize].is_surrounded() {
             return fair("it is no hole in a sheet but an end of the cloth".to_owned()).map(boxed);
@@ -83,7 +83,9 @@ impl PreparedHole {
             "laid in its chart, its patch is no plausible cloth: {}",
             found.join("; ")
         );
-        let why_not = match FairHole::new(welded, hole.id, reason, call) {
+        // A fair surface that is a tangle is dropped: there is no need to push it apart.
+        let fair = FairHole::new(welded, hole.id, reason, Untangling::UnlessTangled, call);
+        let why_not = match fair {
             Ok(fair) => match doubts(&fair.fair.patch, &fair.region) {
                 none if none.is_empty() => return Ok(PreparedHole::Fair(Box::new(fair))),
                 some => some.join("; "),

@@ -79,8 +79,8 @@ const BOX_WORK: u64 = 100;
 /// Nanoseconds of work a pair of faces whose boxes meet.
 const PAIR_WORK: u64 = 100;
 
-/// Whether two faces cut each other; see [`self_intersections`] for what counts.
-fn cut(mesh: &TriMesh, f: u32, g: u32) -> bool {
+/// Whether two faces, with finite corners, cut each other; see [`self_intersections`] for what counts.
+pub(crate) fn cut(mesh: &TriMesh, f: u32, g: u32) -> bool {
     let (mut a, mut b) = (mesh.triangle(f as usize), mesh.triangle(g as usize));
     let mut shared = (0..9)
         .map(|i| (i / 3, i % 3))

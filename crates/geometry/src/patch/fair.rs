@@ -13,7 +13,7 @@ mod tests;
 use darn_budget::{Budget, Exhausted};
 
 use super::attributes::AttributeMap;
-use super::collisions::CollisionMesh;
+use super::collisions::{CollisionMesh, Untangling};
 use super::harmonic::HarmonicExtension;
 use super::plan::rim_pieces;
 use super::{Patch, PatchError, PatchWork};
@@ -134,10 +134,11 @@ impl FairPatch {
         mut self,
         layers: &Layers,
         reach: f64,
+        untangling: Untangling,
         budget: &Budget,
     ) -> Result<FairPatch, Exhausted> {
         self.collisions = self.collisions.beside(layers, reach, budget)?;
-        self.collisions.separate(&mut self.patch, budget)?;
+        (self.collisions).separate(&mut self.patch, untangling, budget)?;
         Ok(self)
     }
 
@@ -152,7 +153,7 @@ impl FairPatch {
         budget: &Budget,
     ) -> Result<(), Exhausted> {
         let all = self.collisions.clone().with_layers(others);
-        all.separate(patch, budget)
+        all.separate(patch, Untangling::Always, budget)
     }
 
     /// How attributes are continued into the patch.

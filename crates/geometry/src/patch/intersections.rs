@@ -6,12 +6,12 @@ use darn_budget::{Budget, Exhausted, Steps};
 use rayon::prelude::*;
 
 use crate::mesh::bounds::Bounds;
-use crate::mesh::intersect::intersections_within;
+use crate::mesh::intersect::cut;
 use crate::mesh::{TriMesh, Vec3};
 
 /// All pairs of faces `(f, g)`, `f < g`, that cut each other, with `g` not below `first`; ascending.
 ///
-/// The same result as [`intersections_within`] for the faces from `first` on, in less time.
+/// The same result as [`intersections_within`](crate::mesh::intersect::intersections_within) for the faces from `first` on, in less time.
 ///
 /// # Errors
 /// `Exhausted`.
@@ -20,41 +20,66 @@ pub(super) fn intersections_from(
     first: usize,
     budget: &Budget,
 ) -> Result<Vec<(u32, u32)>, Exhausted> {
-    let candidates = candidates(mesh, first, budget)?;
-    if candidates.is_empty() {
-        return Ok(Vec::new());
-    }
-    // The exact test, on a mesh of the candidates alone.
-    let mut faces: Vec<u32> = candidates.iter().flat_map(|(f, g)| [*f, *g]).collect();
-    faces.sort_unstable();
-    faces.dedup();
-    let few = mesh.part(faces.iter().map(|f| mesh.faces[*f as usize]));
-    let asked: Vec<u32> = (0u32..)
-        .zip(&faces)
-        .filter(|(_, f)| **f as usize >= first)
-        .map(|(k, _)| k)
-        .collect();
-    // `faces` ascends, so the pairs do, too.
-    let found = intersections_within(&few, &asked, budget)?.into_iter();
-    Ok(found
-        .map(|(f, g)| (faces[f as usize], faces[g as usize]))
-        .collect())
+    let mut pairs = intersections_of(mesh, |face| face >= first, budget)?;
+    pairs.sort_unstable();
+    Ok(pairs)
 }
 
-/// Pairs that may cut: their boxes overlap and no plane test separates them. Two faces below `first` are never
+/// [`intersections_from`] after faces of the patch have moved, from the pairs `before` that. `has_moved` says of every face of the mesh whether it
+/// did: a pair of two that did not stays.
+///
+/// # Errors
+/// `Exhausted`.
+pub(super) fn intersections_after(
+    mesh: &TriMesh,
+    has_moved: &[bool],
+    before: &[(u32, u32)],
+    budget: &Budget,
+) -> Result<Vec<(u32, u32)>, Exhausted> {
+    let mut pairs = intersections_of(mesh, |face| has_moved[face], budget)?;
+    let stayed = |(f, g): &&(u32, u32)| !has_moved[*f as usize] && !has_moved[*g as usize];
+    pairs.extend(before.iter().filter(stayed));
+    pairs.sort_unstable();
+    Ok(pairs)
+}
+
+/// All pairs of faces that cut each other, at least one of them the patch's own.
+fn intersections_of(
+    mesh: &TriMesh,
+    is_own: impl Fn(usize) -> bool,
+    budget: &Budget,
+) -> Result<Vec<(u32, u32)>, Exhausted> {
+    let mut steps = Steps::of(budget);
+    let mut pairs = Vec::new();
+    for (f, g) in candidates(mesh, is_own, budget)? {
+        steps.take(EXACT_WORK)?;
+        if cut(mesh, f, g) {
+            pairs.push((f, g));
+        }
+    }
+    Ok(pairs)
+}
+
+/// Pairs that may cut: their boxes overlap and no plane test separates them. Two faces that are not the patch's own are never
 /// compared.
 ///
 /// # Errors
 /// `Exhausted`.
-fn candidates(mesh: &TriMesh, first: usize, budget: &Budget) -> Result<Vec<(u32, u32)>, Exhausted> {
+fn candidates(
+    mesh: &TriMesh,
+    is_own: impl Fn(usize) -> bool,
+    budget: &Budget,
+) -> Result<Vec<(u32, u32)>, Exhausted> {
     budget.spend(BOX_WORK * mesh.faces.len() as u64)?;
     let boxed = |face: usize| FaceBox::new(mesh, face);
-    let mut own: Vec<FaceBox> = (first..mesh.faces.len()).filter_map(boxed).collect();
+    let (own, held): (Vec<usize>, Vec<usize>) = (0..mesh.faces.len()).partition(|f| is_own(*f));
+    let mut own: Vec<FaceBox> = own.into_iter().filter_map(boxed).collect();
     let Some(all) = own.iter().map(|b| b.bounds).reduce(Bounds::merged) else {
         return Ok(Vec::new());
     };
     let near = |b: &FaceBox| b.bounds.meets(&all);
-    let mut held: Vec<FaceBox> = (0..first).filter_map(boxed).filter(near).collect();
+    let held = held.into_iter().filter_map(boxed);
+    let mut held: Vec<FaceBox> = held.filter(near).collect();
     let strips = Strips::new(&own, &held, &all);
     let (own, held) = (strips.cut(&mut own), strips.cut(&mut held));
     // Their number depends on no thread, nor does the work that is counted.
@@ -85,6 +110,8 @@ const BOX_WORK: u64 = 50;
 const SWEEP_WORK: u64 = 3;
 /// Nanoseconds of work a pair of faces whose boxes meet.
 const PAIR_WORK: u64 = 40;
+/// Nanoseconds of work a pair of faces in the exact test.
+const EXACT_WORK: u64 = 200;
 
 /// A face with its box.
 struct FaceBox {
@@ -258,6 +285,7 @@ const MARGIN: f64 = 1e-13;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::intersect::intersections_within;
     use crate::mesh::shapes::{concat, sheet};
     use proptest::prelude::*;
 
@@ -306,7 +334,7 @@ mod tests {
             let mut mesh = scattered(&places, grain);
             mesh.positions.iter_mut().for_each(|p| p.y *= flat);
             let first = (share * mesh.faces.len() as f64) as usize;
-            let mut found = candidates(&mesh, first, Budget::unlimited()).unwrap();
+            let mut found = candidates(&mesh, |face| face >= first, Budget::unlimited()).unwrap();
             found.sort_unstable();
             prop_assert_eq!(found, candidates_of_all(&mesh, first), "each pair once");
         }
@@ -326,6 +354,27 @@ mod tests {
             let first = (share * mesh.faces.len() as f64) as usize;
             let own: Vec<u32> = (first as u32..mesh.faces.len() as u32).collect();
             prop_assert_eq!(intersections_from(&mesh, first, Budget::unlimited()), intersections_within(&mesh, &own, Budget::unlimited()));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn after_a_move_the_pairs_are_those_of_a_new_search(
+            places in prop::collection::vec(
+                (prop::array::uniform3(-1.0..1.0f64), -1.0..0.5f64, prop::array::uniform3(prop::array::uniform3(-1.0..1.0f64))), 2..80,
+            ),
+            share in 0.0..1.0f64, moves in prop::collection::vec(any::<bool>(), 80),
+        ) {
+            let mut mesh = scattered(&places, 1e-9);
+            let never = Budget::unlimited();
+            let first = (share * mesh.faces.len() as f64) as usize;
+            let before = intersections_from(&mesh, first, never).unwrap();
+            let moved: Vec<bool> = (0..mesh.faces.len()).map(|f| f >= first && moves[f]).collect();
+            for (f, _) in moved.iter().enumerate().filter(|(_, moved)| **moved) {
+                (3 * f..3 * f + 3).for_each(|v| mesh.positions[v].x += 0.3);
+            }
+            let after = intersections_after(&mesh, &moved, &before, never);
+            prop_assert_eq!(after, intersections_from(&mesh, first, never));
         }
     }
 

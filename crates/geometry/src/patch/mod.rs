@@ -32,6 +32,7 @@ mod tests;
 mod triangulate;
 mod untangle;
 
+pub use collisions::Untangling;
 pub use energy::StrainOptions;
 pub use fair::{FairLayout, FairPatch, Fairness};
 pub use last_strain::LastStrain;

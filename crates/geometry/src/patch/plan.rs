@@ -12,7 +12,7 @@ use pieces::{Asked, RimPoints, triangulate_pieces};
 use darn_budget::{Budget, Exhausted};
 
 use super::attributes::AttributeMap;
-use super::collisions::CollisionMesh;
+use super::collisions::{CollisionMesh, Untangling};
 use super::energy::StrainEnergy;
 use super::harmonic::HarmonicExtension;
 use super::metric::PatchMetric;
@@ -227,7 +227,7 @@ impl PatchPlan {
         budget: &Budget,
     ) -> Result<(), Exhausted> {
         let all = self.collisions.clone().with_layers(others);
-        all.separate(patch, budget)
+        all.separate(patch, Untangling::Always, budget)
     }
 
     /// How attributes are continued into the patches of this plan; `chart` must be the plan's.
@@ -309,7 +309,7 @@ impl PatchPlan {
         };
         self.shift(&mut patch.positions, 1.0);
         if last.is_none() || pulls.is_empty() {
-            self.collisions.separate(&mut patch, budget)?;
+            (self.collisions).separate(&mut patch, Untangling::Always, budget)?;
         }
         if pulls.is_empty() {
             return Ok(patch);
@@ -329,7 +329,7 @@ impl PatchPlan {
             patch.strain_rounds += rounds.map_err(PatchError::of_stage("strain"))?;
             patch.positions = self.with_rim(&positions);
             self.shift(&mut patch.positions, 1.0);
-            self.collisions.separate(&mut patch, budget)?;
+            (self.collisions).separate(&mut patch, Untangling::Always, budget)?;
         }
         Ok(patch)
     }

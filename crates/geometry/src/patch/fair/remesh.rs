@@ -1,7 +1,7 @@
 //! Even triangles for a patch in space: long edges are split, edges flipped towards Delaunay, inner vertices drawn to
 //! the middle of their neighbours. The rim stays.
 
-use std::collections::HashSet;
+use std::collections::BTreeMap;
 
 use darn_budget::{Budget, Exhausted};
 
@@ -27,10 +27,53 @@ const BENT: f64 = 0.3;
 const FACE_WORK: u64 = 400;
 
 /// An inner edge with its two faces: `face` runs from the first end to the second, `other` back.
+#[derive(Debug, Clone, Copy)]
 struct InnerEdge {
     ends: [u32; 2],
     face: u32,
     other: u32,
+}
+
+/// The edges of a sheet, each between a lower and a higher vertex, ascending.
+struct Edges {
+    all: Vec<(u32, u32)>,
+    inner: Vec<InnerEdge>,
+}
+
+impl Edges {
+    fn of(faces: &[[u32; 3]]) -> Edges {
+        // Lower end, higher end, face, whether the face runs up from the lower one: in one number, as sorting them takes most of the time.
+        let sides = (0u32..).zip(faces).flat_map(|(f, face)| {
+            [0, 1, 2].map(|k| {
+                let (a, b) = (face[k], face[(k + 1) % 3]);
+                let ends = u128::from(a.min(b)) << 96 | u128::from(a.max(b)) << 64;
+                ends | u128::from(f) << 32 | u128::from(a < b)
+            })
+        });
+        let mut sides: Vec<u128> = sides.collect();
+        sides.sort_unstable();
+        let of_edge = || sides.chunk_by(|a, b| a >> 64 == b >> 64);
+        let ends = |side: u128| ((side >> 96) as u32, (side >> 64) as u32);
+        let inner = |sides: &[u128]| match *sides {
+            [first, second] => {
+                let (low, high) = ends(first);
+                Some(InnerEdge {
+                    ends: if first & 1 == 1 {
+                        [low, high]
+                    } else {
+                        [high, low]
+                    },
+                    face: (first >> 32) as u32,
+                    other: (second >> 32) as u32,
+                })
+            }
+            _ => None,
+        };
+        Edges {
+            all: of_edge().map(|sides| ends(sides[0])).collect(),
+            inner: of_edge().filter_map(inner).collect(),
+        }
+    }
 }
 
 impl Sheet {
@@ -42,10 +85,17 @@ impl Sheet {
     /// # Errors
     /// `Exhausted`.
     pub fn remesh(&mut self, length: f64, most: usize, budget: &Budget) -> Result<(), Exhausted> {
+        let mut edges = Edges::of(&self.mesh.faces);
         for _ in 0..PASSES {
             budget.spend(2 * FACE_WORK * self.mesh.faces.len() as u64)?;
-            let split = self.split(LONG * length, most);
-            let flipped = self.flip();
+            let split = self.split(&edges, LONG * length, most);
+            if split > 0 {
+                edges = Edges::of(&self.mesh.faces);
+            }
+            let flipped = self.flip(&edges);
+            if flipped > 0 {
+                edges = Edges::of(&self.mesh.faces);
+            }
             if split + flipped == 0 {
                 break;
             }
@@ -68,37 +118,15 @@ impl Sheet {
         (a.max(b) as usize) < self.corners
     }
 
-    /// All inner edges, ascending by their lower end.
-    fn inner_edges(&self) -> Vec<InnerEdge> {
-        let mut sides: Vec<(u32, u32, u32, bool)> = Vec::with_capacity(3 * self.mesh.faces.len());
-        for (f, face) in (0u32..).zip(&self.mesh.faces) {
-            for k in 0..3 {
-                let (a, b) = (face[k], face[(k + 1) % 3]);
-                sides.push((a.min(b), a.max(b), f, a < b));
-            }
-        }
-        sides.sort_unstable();
-        let inner = |pair: &[(u32, u32, u32, bool)]| match pair {
-            [(a, b, f, up), (_, _, g, _)] => Some(InnerEdge {
-                ends: if *up { [*a, *b] } else { [*b, *a] },
-                face: *f,
-                other: *g,
-            }),
-            _ => None,
-        };
-        let same = |a: &(u32, u32, u32, bool), b: &(u32, u32, u32, bool)| (a.0, a.1) == (b.0, b.1);
-        sides.chunk_by(same).filter_map(inner).collect()
-    }
-
     /// Splits chords and edges longer than `longest` in the middle, the longest first, each face at most once; how many.
-    fn split(&mut self, longest: f64, most: usize) -> usize {
+    fn split(&mut self, edges: &Edges, longest: f64, most: usize) -> usize {
         let room = most.saturating_sub(self.inner());
         let length = |e: &InnerEdge| {
             let [a, b] = e.ends.map(|v| self.mesh.positions[v as usize]);
             (b - a).norm()
         };
-        let mut long: Vec<(bool, f64, InnerEdge)> = (self.inner_edges().into_iter())
-            .map(|e| (self.is_chord(e.ends[0], e.ends[1]), length(&e), e))
+        let mut long: Vec<(bool, f64, InnerEdge)> = (edges.inner.iter())
+            .map(|e| (self.is_chord(e.ends[0], e.ends[1]), length(e), *e))
             .filter(|(chord, length, _)| *chord || (*length > longest && room > 0))
             .collect();
         // Chords first: they are split even where there is no room.
@@ -132,19 +160,17 @@ impl Sheet {
     }
 
     /// Flips edges whose opposite angles add up to more than π, each face at most once; how many.
-    fn flip(&mut self) -> usize {
-        let edges = self.inner_edges();
+    fn flip(&mut self, edges: &Edges) -> usize {
         let key = |a: u32, b: u32| (a.min(b), a.max(b));
-        let mut joined: HashSet<(u32, u32)> = (self.mesh.faces.iter())
-            .flat_map(|f| [key(f[0], f[1]), key(f[1], f[2]), key(f[2], f[0])])
-            .collect();
+        // Whether two vertices are joined, where the flips so far have changed that.
+        let mut changed: BTreeMap<(u32, u32), bool> = BTreeMap::new();
         let mut touched = vec![false; self.mesh.faces.len()];
         let mut count = 0;
         for InnerEdge {
             ends: [a, b],
             face,
             other,
-        } in edges
+        } in edges.inner.iter().copied()
         {
             let (f, g) = (face as usize, other as usize);
             if touched[f] || touched[g] {
@@ -157,18 +183,18 @@ impl Sheet {
             let (Some(c), Some(d)) = (apex(f), apex(g)) else {
                 continue;
             };
-            if c == d
-                || self.is_chord(c, d)
-                || joined.contains(&key(c, d))
-                || !self.improves([a, b, c, d])
-            {
+            if c == d || self.is_chord(c, d) || !self.improves([a, b, c, d]) {
+                continue;
+            }
+            let was_joined = || edges.all.binary_search(&key(c, d)).is_ok();
+            if changed.get(&key(c, d)).copied().unwrap_or_else(was_joined) {
                 continue;
             }
             self.mesh.faces[f] = [a, d, c];
             self.mesh.faces[g] = [d, b, c];
             (touched[f], touched[g]) = (true, true);
-            joined.remove(&key(a, b));
-            joined.insert(key(c, d));
+            changed.insert(key(a, b), false);
+            changed.insert(key(c, d), true);
             count += 1;
         }
         count
@@ -177,6 +203,10 @@ impl Sheet {
     /// Whether the edge from `c` to `d` is better than that from `a` to `b`, with the faces (a, b, c) and (b, a, d).
     fn improves(&self, quad: [u32; 4]) -> bool {
         let [a, b, c, d] = quad.map(|v| self.mesh.positions[v as usize]);
+        // Two acute angles add up to less than π: most edges need no more than this.
+        if (a - c).dot(&(b - c)) > 0.0 && (a - d).dot(&(b - d)) > 0.0 {
+            return false;
+        }
         let angle = |p: Vec3, q: Vec3, r: Vec3| {
             let (u, v) = (q - p, r - p);
             u.cross(&v).norm().atan2(u.dot(&v))

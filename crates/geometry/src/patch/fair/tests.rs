@@ -29,7 +29,12 @@ fn patched(soup: &TriMesh, chosen: impl Fn(&BoundaryLoop) -> f64) -> Patch {
     let region = collar(&whole, rim, 0.0, Budget::unlimited()).expect("a collar");
     let fair =
         FairPatch::new(&region, Fairness::Curved, &PatchOptions::default()).expect("a patch");
-    let fair = fair.clear_of(&Layers::default(), 0.0, Budget::unlimited());
+    let fair = fair.clear_of(
+        &Layers::default(),
+        0.0,
+        Untangling::Always,
+        Budget::unlimited(),
+    );
     let patch = fair.expect("no limits").patch;
     for (v, p) in patch.rim.iter().zip(&patch.positions) {
         assert_eq!(*p, region.mesh.positions[*v as usize]);
@@ -191,9 +196,10 @@ fn a_plain_surface_is_flatter_than_the_cloth_around_it() {
         let never = Budget::unlimited();
         let region = collar(&whole, top.expect("a loop").id, 0.0, never).expect("a collar");
         let plain = FairPatch::new(&region, Fairness::Plain, &PatchOptions::default());
-        let plain = plain
-            .expect("a patch")
-            .clear_of(&Layers::default(), 0.0, never);
+        let plain =
+            plain
+                .expect("a patch")
+                .clear_of(&Layers::default(), 0.0, Untangling::Always, never);
         let patch = plain.expect("no limits").patch;
         assert_eq!(patch.crossings, 0);
         let heights = patch.positions.iter().map(|p| p.z);
