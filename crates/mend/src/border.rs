@@ -289,7 +289,7 @@ fn with_strips(
     let pieces = Pieces::of_lines(&whole, across, closed.len());
     let around = pieces.loops_around(&welded);
     let (loops, ids) = renumbered(&welded, &whole, &pieces, &around);
-    welded.renumbered(loops, budget)?;
+    welded.with_loops(scan, loops, budget)?;
     welded.timings.weld += whole.timings.weld;
     welded.timings.loops += whole.timings.loops;
     welded.cuts = whole.cuts;

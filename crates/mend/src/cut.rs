@@ -108,7 +108,7 @@ impl CutScan {
         let pieces = Pieces::of(whole, &is_cut, budget)?;
         let around = pieces.loops_around(&welded);
         let (loops, ids) = renumbered(&welded, whole, &pieces, &around);
-        welded.renumbered(loops, budget)?;
+        welded.with_loops(&rest, loops, budget)?;
         let around = around
             .into_iter()
             .zip(ids)

@@ -10,7 +10,7 @@ use darn_gltf_scan::{Scan, ScanLimits};
 use rayon::prelude::*;
 
 use crate::testing::{mender, scan_of, scan_of_tiles};
-use crate::{find_holes, mend};
+use crate::{MendError, find_holes, mend};
 
 /// A bent sheet with a hole in its middle and one beside.
 fn cloth() -> TriMesh {
@@ -183,4 +183,35 @@ fn the_holes_of_a_second_skin_are_filled_once() {
     let after = Scan::read(mended.bytes, &ScanLimits::default()).expect("a readable answer");
     let new = after.surface.faces.len() - scan.surface.faces.len();
     assert_eq!(new, 2 * patch.faces as usize, "both sides");
+    // Mended once more, it is as it was: the back is not closed again beneath the patch.
+    let again = mend(&after, &Constraints::default(), mender()).expect_err("no hole");
+    let MendError::NoHoles { skipped } = again else {
+        panic!("{again}");
+    };
+    let codes = skipped.iter().map(|l| l.code.as_str());
+    assert_eq!(codes.filter(|code| *code == "second_skin").count(), 1);
+}
+
+#[test]
+fn a_hole_in_a_patch_or_beside_it_is_no_second_skin() {
+    let scan = scan_of(&holed_sheet(24, 0.15));
+    let mended = mend(&scan, &Constraints::default(), mender()).expect("a mended scan");
+    let after = Scan::read(mended.bytes, &ScanLimits::default()).expect("a readable answer");
+    // A hole that takes a part of the patch and of the cloth beside it, and one within the patch.
+    for (middle, radius) in [(0.63, 0.05), (0.5, 0.05)] {
+        let kept = |face: &u32| {
+            let corners = after.surface.triangle(*face as usize);
+            let at: Vec3 = corners.iter().map(|p| p / 3.0).sum();
+            (at.x - middle).hypot(at.y - 0.5) > radius
+        };
+        let is_cut: Vec<bool> = (0..after.surface.faces.len() as u32)
+            .map(|f| !kept(&f))
+            .collect();
+        assert!(is_cut.contains(&true));
+        let torn = after
+            .without_faces(&is_cut, Budget::unlimited())
+            .expect("a torn scan");
+        let again = mend(&torn, &Constraints::default(), mender()).expect("a hole");
+        assert_eq!(again.report.holes.len(), 1, "{middle}");
+    }
 }

@@ -29,7 +29,7 @@ pub fn notes(welded: &WeldedScan, scan: &Scan) -> Vec<String> {
     let skins = welded.second_skins.iter().flatten().count();
     if skins > 0 {
         notes.push(format!(
-            "{skins} hole(s) belong to a second skin that lies on the cloth; they are closed by the patches of the first skin"
+            "{skins} hole(s) belong to a second skin that lies on the cloth; the patches of the first skin close them and their own rims stay open"
         ));
     }
     if scan.parts.iter().any(|p| p.shared) {

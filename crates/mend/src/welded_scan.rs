@@ -12,7 +12,7 @@ use darn_geometry::mesh::index::FaceId;
 use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind, boundary_loops};
 use darn_geometry::mesh::openings::Evidence;
 use darn_geometry::mesh::region::BoundedMesh;
-use darn_geometry::mesh::skins::{SecondSkin, second_skins};
+use darn_geometry::mesh::skins::{SecondSkin, on_patches, second_skins};
 use darn_geometry::mesh::topology::Topology;
 use darn_geometry::mesh::weld::{WeldedMesh, weld_within};
 use darn_geometry::mesh::{TriMesh, Vec3};
@@ -81,38 +81,60 @@ impl WeldedScan {
         let (topology, blocks) =
             rayon::join(|| surface.topology(), || FaceBlocks::new(&surface.mesh));
         let loops = boundary_loops(&surface.mesh, &topology);
-        let second_skins = second_skins(&surface.mesh, &loops, budget)?;
-        let timings = v1::ScanTimings {
-            weld,
-            loops: milliseconds(started),
-            ..Default::default()
-        };
-        let welded = WeldedScan {
+        let mut welded = WeldedScan {
             blocks,
             surface,
             topology,
-            loops,
-            second_skins,
+            loops: Vec::new(),
+            second_skins: Vec::new(),
             cuts: CutLoops::default(),
-            timings,
+            timings: v1::ScanTimings::default(),
+        };
+        welded.with_loops(scan, loops, budget)?;
+        welded.timings = v1::ScanTimings {
+            weld,
+            loops: milliseconds(started),
+            ..Default::default()
         };
         budget.release(WELDING * faces);
         budget.hold(welded.bytes())?;
         Ok(welded)
     }
 
-    /// Puts the loops in the order of their ids, which changed.
+    /// Takes these loops in the order of their ids, and finds which are holes of second skins.
     ///
     /// # Errors
     /// `Exhausted`.
-    pub fn renumbered(
+    pub fn with_loops(
         &mut self,
+        scan: &Scan,
         loops: Vec<BoundaryLoop>,
         budget: &Budget,
     ) -> Result<(), Exhausted> {
-        self.second_skins = second_skins(&self.surface.mesh, &loops, budget)?;
+        let mesh = &self.surface.mesh;
+        self.second_skins = second_skins(mesh, &loops, budget)?;
+        let patches = scan.parts.iter().filter(|part| part.reconstructed);
+        let patched = patches.flat_map(|part| part.vertices.clone());
+        let at = |v: u32| scan.surface.positions[v as usize].into();
+        let patched: Vec<[f64; 3]> = patched.map(at).collect();
+        if !patched.is_empty() {
+            let holes = loops.iter().filter(|l| {
+                l.kind == LoopKind::Hole
+                    && self.second_skins[l.id.index()].is_none()
+                    && !self.is_in_patch(scan, l)
+            });
+            for hole in on_patches(mesh, holes, patched, budget)? {
+                self.second_skins[hole.id.index()] = Some(SecondSkin::Patched);
+            }
+        }
         self.loops = loops;
         Ok(())
+    }
+
+    /// Whether a loop runs along the triangles of a patch.
+    fn is_in_patch(&self, scan: &Scan, rim: &BoundaryLoop) -> bool {
+        let mut sources = rim.half_edges.iter().map(|h| self.source(scan, h.face()));
+        sources.any(|s| s.is_some_and(|s| scan.parts[s.part].reconstructed))
     }
 
     /// Bytes of memory that it holds, estimated.
@@ -168,7 +190,8 @@ impl WeldedScan {
     /// Whether a second skin that shows the other side has a copy of this hole.
     pub fn has_back(&self, hole: u32) -> bool {
         let mut skins = self.second_skins.iter().flatten();
-        skins.any(|skin| skin.first == hole && skin.is_back)
+        skins
+            .any(|skin| matches!(skin, SecondSkin::Copy { first, is_back: true } if *first == hole))
     }
 
     /// The loop with an id, or why there is none.

@@ -12,13 +12,18 @@ const THIN: f64 = 0.05;
 /// Nanoseconds of work a vertex in a search tree.
 const VERTEX_WORK: u64 = 500;
 
-/// A hole whose rim is a copy of another hole's rim.
+/// A hole of a second skin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SecondSkin {
-    /// The hole that is copied, by index among the loops; the lower one.
-    pub first: u32,
-    /// Whether the copy shows the other side.
-    pub is_back: bool,
+pub enum SecondSkin {
+    /// Its rim is a copy of another hole's rim.
+    Copy {
+        /// The hole that is copied, by index among the loops; the lower one.
+        first: u32,
+        /// Whether the copy shows the other side.
+        is_back: bool,
+    },
+    /// Its rim lies on a patch that closes the hole of the first skin.
+    Patched,
 }
 
 /// Per loop whether it is a hole of a second skin, and of which hole. O(n log n) in the holes' vertices.
@@ -41,7 +46,7 @@ pub fn second_skins(
     let centres = holes().map(|l| GeomWithData::new(centre(l), l.id.0));
     let centres = RTree::bulk_load(centres.collect());
     for hole in holes() {
-        let thin = THIN * hole.length / hole.vertices.len() as f64;
+        let thin = thin_beside(hole);
         let near = centres.locate_within_distance(centre(hole), thin * thin);
         let mut near: Vec<u32> = near.map(|c| c.data).filter(|c| *c < hole.id.0).collect();
         near.sort_unstable();
@@ -54,9 +59,9 @@ pub fn second_skins(
                 continue;
             }
             steps.take(VERTEX_WORK * 2 * hole.vertices.len() as u64)?;
-            if copies(mesh, other, hole, thin) {
+            if copies(mesh, other, hole) {
                 let is_back = vector_area(mesh, other).dot(&vector_area(mesh, hole)) < 0.0;
-                skins[hole.id.index()] = Some(SecondSkin { first, is_back });
+                skins[hole.id.index()] = Some(SecondSkin::Copy { first, is_back });
                 break;
             }
         }
@@ -64,15 +69,47 @@ pub fn second_skins(
     Ok(skins)
 }
 
+/// Those of some holes whose rims lie on the `vertices` of patches. O(n log n).
+///
+/// # Errors
+/// `Exhausted`.
+pub fn on_patches<'l>(
+    mesh: &TriMesh,
+    holes: impl Iterator<Item = &'l BoundaryLoop>,
+    vertices: Vec<[f64; 3]>,
+    budget: &Budget,
+) -> Result<Vec<&'l BoundaryLoop>, Exhausted> {
+    budget.spend(VERTEX_WORK * vertices.len() as u64)?;
+    let tree = RTree::bulk_load(vertices);
+    let mut steps = Steps::of(budget);
+    let mut found = Vec::new();
+    for hole in holes {
+        steps.take(VERTEX_WORK * hole.vertices.len() as u64)?;
+        if lies_beside(mesh, hole, &tree) {
+            found.push(hole);
+        }
+    }
+    Ok(found)
+}
+
+/// How far a vertex of a rim may lie from what it lies on, scene units.
+fn thin_beside(rim: &BoundaryLoop) -> f64 {
+    THIN * rim.length / rim.vertices.len() as f64
+}
+
 /// Whether every vertex of a rim lies beside one of another.
-fn copies(mesh: &TriMesh, first: &BoundaryLoop, second: &BoundaryLoop, thin: f64) -> bool {
-    let points = |l: &BoundaryLoop| -> Vec<[f64; 3]> {
-        let each = l.vertices.iter();
-        each.map(|v| mesh.positions[v.index()].into()).collect()
-    };
-    let tree = RTree::bulk_load(points(first));
-    points(second).iter().all(|p| {
-        let nearest = tree.nearest_neighbor_iter_with_distance_2(p).next();
+fn copies(mesh: &TriMesh, first: &BoundaryLoop, second: &BoundaryLoop) -> bool {
+    let points = first.vertices.iter();
+    let points = points.map(|v| mesh.positions[v.index()].into());
+    lies_beside(mesh, second, &RTree::bulk_load(points.collect()))
+}
+
+/// Whether every vertex of a rim lies beside one of a tree.
+fn lies_beside(mesh: &TriMesh, rim: &BoundaryLoop, tree: &RTree<[f64; 3]>) -> bool {
+    let thin = thin_beside(rim);
+    rim.vertices.iter().all(|v| {
+        let point: [f64; 3] = mesh.positions[v.index()].into();
+        let nearest = tree.nearest_neighbor_iter_with_distance_2(&point).next();
         nearest.is_some_and(|(_, distance)| distance <= thin * thin)
     })
 }
@@ -105,7 +142,7 @@ mod tests {
 
     #[test]
     fn the_holes_of_a_second_skin_are_found_and_those_of_a_second_layer_are_not() {
-        let back = Some(SecondSkin {
+        let back = Some(SecondSkin::Copy {
             first: 1,
             is_back: true,
         });
