@@ -3,6 +3,7 @@
 use super::failure::{Failure, OrFail};
 use crate::settings::SizeArgs;
 use darn_budget::Budget;
+use darn_contract::port::NewFile;
 use darn_gltf_scan::{
     Container, Scan, Siblings, material_image_paths, material_library_paths, sibling_paths,
 };
@@ -18,14 +19,20 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
 
 /// A scan, and the files beside it that a glTF, or an OBJ with its material libraries, refers to by relative paths. No file above the scan's folder is read.
 pub fn read_scan(path: &Path, size: &SizeArgs, budget: &Budget<'_>) -> Result<Scan, Failure> {
-    let reading = || format!("read {}", path.display());
     let bytes = read(path)?;
-    let files = if is_json(&bytes) {
-        siblings(path, sibling_paths(&bytes).or_fail(reading())?)?
+    let files = read_files_of(path, &bytes)?;
+    let reading = format!("read {}", path.display());
+    Scan::read_with_siblings(bytes, files, &size.limits(), budget).or_fail(reading)
+}
+
+/// The files that a scan at a path refers to, as [`read_scan`] reads them.
+pub fn read_files_of(path: &Path, scan: &[u8]) -> Result<Siblings, Failure> {
+    if is_json(scan) {
+        let reading = format!("read {}", path.display());
+        siblings(path, sibling_paths(scan).or_fail(reading)?)
     } else {
-        materials(path, &bytes)?
-    };
-    Scan::read_with_siblings(bytes, files, &size.limits(), budget).or_fail(reading())
+        materials(path, scan)
+    }
 }
 
 fn is_json(bytes: &[u8]) -> bool {
@@ -57,6 +64,12 @@ fn siblings(gltf: &Path, paths: Vec<String>) -> Result<Siblings, Failure> {
     Ok(Siblings(files))
 }
 
+/// Whether an output's name asks for one file with all others in it.
+pub fn packs(output: &Path) -> bool {
+    let extension = output.extension().unwrap_or_default();
+    extension.eq_ignore_ascii_case("glb")
+}
+
 /// A mended scan as a GLB with all its files, if that is what the output's name asks for and the scan is not one already.
 pub fn packed_scan(path: &Path, scan: &Scan, mended: &[u8]) -> Result<Option<Vec<u8>>, Failure> {
     let extension = path.extension().unwrap_or_default();
@@ -68,7 +81,7 @@ pub fn packed_scan(path: &Path, scan: &Scan, mended: &[u8]) -> Result<Option<Vec
             "{name}: the mended scan has the format of the scan; let the output's name end in .{own}"
         )));
     }
-    if extension.eq_ignore_ascii_case("glb") && scan.container() != Container::Glb {
+    if packs(path) && scan.container() != Container::Glb {
         let packed = scan
             .packed(mended)
             .or_fail(format!("write {}", path.display()));
@@ -77,10 +90,29 @@ pub fn packed_scan(path: &Path, scan: &Scan, mended: &[u8]) -> Result<Option<Vec
     Ok(None)
 }
 
-/// Writes a mended scan in the container it was read from. A glTF or an OBJ written into another folder takes its files there; a file that is there already stays.
-pub fn write_scan(path: &Path, scan: &Scan, mended: &[u8]) -> Result<(), Failure> {
+/// Writes a mended scan in the container it was read from, and the file of its patches if they have one. A glTF or an OBJ written into another folder
+/// takes its files there; a file that is there already stays.
+pub fn write_scan(
+    path: &Path,
+    scan: &Scan,
+    mended: &[u8],
+    file: Option<&NewFile>,
+) -> Result<(), Failure> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    for (name, bytes) in scan.siblings() {
+    if let Some(file) = file {
+        write(&folder.join(&file.path), &file.bytes)?;
+    }
+    write_files_of(path, scan.siblings())?;
+    write(path, mended)
+}
+
+/// Writes the files of a scan at a path, by their paths relative to it; one that is there already stays.
+pub fn write_files_of<'f>(
+    path: &Path,
+    files: impl IntoIterator<Item = (&'f str, &'f [u8])>,
+) -> Result<(), Failure> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    for (name, bytes) in files {
         let place = folder.join(name);
         if !place.exists() {
             let parent = place.parent().unwrap_or(folder);
@@ -88,7 +120,7 @@ pub fn write_scan(path: &Path, scan: &Scan, mended: &[u8]) -> Result<(), Failure
             write(&place, bytes)?;
         }
     }
-    write(path, mended)
+    Ok(())
 }
 
 /// What the name of a mesh file ends in; a glTF may have any name.

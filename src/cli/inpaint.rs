@@ -10,7 +10,7 @@ use super::provenance_date::MendDate;
 use crate::settings::{DeadlineArgs, NetworkArgs, SizeArgs, TextureArgs};
 use darn_contract::port::Mended;
 use darn_contract::v1::{FileDigests, Report};
-use darn_contract::{Constraints, FieldError, LAST_ALTERNATIVE, Outcome};
+use darn_contract::{Constraints, FieldError, LAST_ALTERNATIVE, Outcome, PatchBuffer};
 use darn_gltf_scan::Scan;
 use darn_mend::{Call, MendError, NetworkMender};
 use std::path::{Path, PathBuf};
@@ -168,10 +168,14 @@ impl<'a> FileMender<'a> {
             mender: &self.mender,
             budget: &budget,
         };
-        let mut mended = match darn_mend::mend(&read_scan, &self.constraints, call) {
+        let mut constraints = self.constraints.clone();
+        if files::packs(output) {
+            constraints.patch_buffer = PatchBuffer::Data;
+        }
+        let mut mended = match darn_mend::mend(&read_scan, &constraints, call) {
             Err(MendError::NoHoles { .. }) if self.args.if_no_holes == IfNoHoles::Copy => {
                 stage("copying");
-                files::write_scan(output, &read_scan, &files::read(scan)?)?;
+                files::write_scan(output, &read_scan, &files::read(scan)?, None)?;
                 return Ok(FileOutcome::Copied);
             }
             mended => mended.or_fail(format!("mend {}", scan.display()))?,
@@ -199,7 +203,7 @@ impl<'a> FileMender<'a> {
         }
         match packed {
             Some(packed) => files::write(output, &packed)?,
-            None => files::write_scan(output, &read_scan, &mended.bytes)?,
+            None => files::write_scan(output, &read_scan, &mended.bytes, mended.file.as_ref())?,
         }
         Ok(FileOutcome::Mended(Box::new(mended.report)))
     }

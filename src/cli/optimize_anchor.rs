@@ -73,7 +73,7 @@ pub fn run(args: &OptimizeAnchorArgs) -> Result<(), Failure> {
         let mended = darn_mend::mend(&scan, &anchor, call()).or_fail(format!("mend {name}"))?;
         match files::packed_scan(path, &scan, &mended.bytes)? {
             Some(packed) => files::write(path, &packed)?,
-            None => files::write_scan(path, &scan, &mended.bytes)?,
+            None => files::write_scan(path, &scan, &mended.bytes, mended.file.as_ref())?,
         }
     }
     drop(progress);

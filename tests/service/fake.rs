@@ -375,6 +375,7 @@ impl Mender for FakeMender {
             bytes: mended(&scan),
             media_type: "model/gltf-binary",
             report: report(constraints),
+            file: None,
         })
     }
 

@@ -18,7 +18,7 @@ pub use json::{JsonError, from_json};
 pub use outcome::Outcome;
 pub use validate::{
     Anchor, Border, Constraints, Cut, Diameters, Edit, FieldError, Fill, Gesture, HoleSelector,
-    LAST_ALTERNATIVE, Search, TextureChoice, TornEdge,
+    LAST_ALTERNATIVE, PatchBuffer, Search, TextureChoice, TornEdge,
 };
 
 /// The messages of `proto/darn/v1/darn.proto`, as generated.

@@ -23,6 +23,17 @@ pub struct Mended {
     pub media_type: &'static str,
     /// What was done.
     pub report: v1::Report,
+    /// A file that the glTF refers to anew, if it is neither in the glTF nor in its zip: of a scan whose files were read beside it.
+    pub file: Option<NewFile>,
+}
+
+/// A file that a mended glTF refers to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NewFile {
+    /// Its path relative to the glTF.
+    pub path: String,
+    /// What it holds.
+    pub bytes: Vec<u8>,
 }
 
 /// A scan without what darn put in, and the report.

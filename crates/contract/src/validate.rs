@@ -9,7 +9,7 @@ use super::v1;
 mod choices;
 mod selector;
 
-pub use choices::{Fill, LAST_ALTERNATIVE, TextureChoice};
+pub use choices::{Fill, LAST_ALTERNATIVE, PatchBuffer, TextureChoice};
 pub(super) use selector::list;
 pub use selector::{Border, Cut, HoleSelector, TornEdge};
 
@@ -63,6 +63,8 @@ pub struct Constraints {
     pub texture: Option<TextureChoice>,
     /// Which of the plausible fills is applied, 0 (the likeliest) to [`LAST_ALTERNATIVE`]; `None` leaves it to the mender.
     pub alternative: Option<u8>,
+    /// Where the patches of a glTF go that came in several files.
+    pub patch_buffer: PatchBuffer,
 }
 
 /// A range of loop diameters, both ends included, in the scene's unit. The default has no ends.
@@ -175,6 +177,7 @@ impl Constraints {
         let fill = (message.fill.as_deref()).and_then(|fill| errors.fill(fill));
         let texture = (message.texture.as_deref()).and_then(|texture| errors.texture(texture));
         let alternative = (message.alternative).and_then(|number| errors.alternative(number));
+        let patch_buffer = (message.patch_buffer.as_deref()).and_then(|it| errors.patch_buffer(it));
         let diameters = Diameters {
             max: errors.diameter("/maxDiameter", message.max_diameter),
             min: errors.diameter("/minDiameter", message.min_diameter),
@@ -200,6 +203,7 @@ impl Constraints {
                 accept_doubtful: message.accept_doubtful,
                 texture,
                 alternative,
+                patch_buffer: patch_buffer.unwrap_or_default(),
             })
         } else {
             Err(errors.0)

@@ -89,6 +89,12 @@ fn diameters_and_kinds_to_fill_are_read() {
     assert_eq!(check(text), Ok(expected));
     let rare = check(r#"{"alternative": 7}"#).map(|asked| asked.alternative);
     assert_eq!(rare, Ok(Some(7)));
+    let buffer = |text: &str| check(text).map(|asked| asked.patch_buffer);
+    assert_eq!(buffer("{}"), Ok(PatchBuffer::Data));
+    assert_eq!(buffer(r#"{"patchBuffer": "data"}"#), Ok(PatchBuffer::Data));
+    assert_eq!(buffer(r#"{"patchBuffer": "file"}"#), Ok(PatchBuffer::File));
+    let unknown = Err(vec!["/patchBuffer".to_owned()]);
+    assert_eq!(buffer(r#"{"patchBuffer": "disk"}"#), unknown);
     let beyond = check(r#"{"alternative": 8}"#);
     assert_eq!(beyond, Err(vec!["/alternative".to_owned()]));
     let crossed = check(r#"{"minDiameter": 2, "maxDiameter": 1}"#);

@@ -12,6 +12,7 @@ use super::compressed::meshopt;
 use super::container::{Container, pack_glb_of_pieces, too_long};
 use super::error::ScanError;
 use super::json_edit::JsonEdit;
+use super::patch_buffer::{NewFile, PatchBuffer};
 use super::scan::Scan;
 use super::undo;
 
@@ -32,8 +33,10 @@ pub(super) struct Appender<'s> {
     buffer: usize,
     /// How many bytes that buffer has before them.
     start: usize,
-    /// Whether that buffer is the BIN chunk; if not, it is a new data URI.
+    /// Whether that buffer is the BIN chunk; if not, it is a new data URI or file.
     in_bin: bool,
+    /// Whether it is a file.
+    in_file: bool,
     data: Vec<u8>,
 }
 
@@ -74,7 +77,7 @@ impl AccessorBounds {
 
 impl<'s> Appender<'s> {
     /// Nothing appended yet.
-    pub fn new(scan: &'s Scan) -> Self {
+    pub fn new(scan: &'s Scan, wanted: PatchBuffer) -> Self {
         let buffers = scan
             .json
             .get("buffers")
@@ -98,6 +101,9 @@ impl<'s> Appender<'s> {
             _ => 0,
         };
         let buffer = if in_bin { 0 } else { buffers.len() };
+        let in_file = wanted == PatchBuffer::File
+            && scan.layout.container == Container::Gltf
+            && scan.companions.are_several();
         Self {
             scan,
             lists: BTreeMap::new(),
@@ -108,6 +114,7 @@ impl<'s> Appender<'s> {
             buffer,
             start,
             in_bin,
+            in_file,
             data: Vec::new(),
         }
     }
@@ -218,16 +225,22 @@ impl<'s> Appender<'s> {
         self.data.len()
     }
 
-    /// The whole scan, in the container it was read from.
-    pub fn finish(mut self) -> Result<Vec<u8>, ScanError> {
+    /// The whole glTF, in the container it was read from, and the file that it refers to anew.
+    pub fn finish(mut self) -> Result<(Vec<u8>, Option<NewFile>), ScanError> {
         let length = self.start + self.data.len();
         let (bytes, layout) = (&self.scan.bytes, &self.scan.layout);
         let mut edit = JsonEdit::new(bytes.get(layout.json.clone()).unwrap_or_default())?;
+        let file = self
+            .in_file
+            .then(|| NewFile::of(std::mem::take(&mut self.data), self.scan));
         if !self.in_bin {
-            let uri = format!(
-                "data:application/octet-stream;base64,{}",
-                STANDARD.encode(&self.data)
-            );
+            let uri = match &file {
+                Some(file) => file.path.clone(),
+                None => {
+                    let data = STANDARD.encode(&self.data);
+                    format!("data:application/octet-stream;base64,{data}")
+                }
+            };
             self.push("buffers", json!({ "byteLength": length, "uri": uri }));
         } else if self.push("buffers", json!({ "byteLength": length })) > 0 {
             // The BIN chunk already has a buffer: its length grows.
@@ -253,7 +266,7 @@ impl<'s> Appender<'s> {
         let text = undo::with_record(self.scan, edit.finish())?.into_bytes();
         if layout.container == Container::Gltf {
             let head = bytes.get(..layout.json.start).unwrap_or_default();
-            return Ok([head, &text].concat());
+            return Ok(([head, &text].concat(), file));
         }
         let old = layout.bin.clone().and_then(|range| bytes.get(range));
         let padding = [0; 4];
@@ -270,7 +283,7 @@ impl<'s> Appender<'s> {
         let mut out =
             pack_glb_of_pieces(&text, bin, rest).ok_or_else(|| too_long(text.len() + length))?;
         out.extend_from_slice(bytes.get(layout.trailing.clone()).unwrap_or_default());
-        Ok(out)
+        Ok((out, None))
     }
 }
 

@@ -45,6 +45,22 @@ impl Companions {
         Ok(None)
     }
 
+    /// Whether there is a file at a path relative to the scan.
+    pub fn has(&self, path: &str) -> bool {
+        match self {
+            Self::Siblings(Siblings(files)) => files.contains_key(path),
+            Self::Zip(zip) => zip.place(path).is_some(),
+        }
+    }
+
+    /// Whether the scan came in several files, or in a zip.
+    pub fn are_several(&self) -> bool {
+        match self {
+            Self::Siblings(Siblings(files)) => !files.is_empty(),
+            Self::Zip(_) => true,
+        }
+    }
+
     /// Bytes of memory of the files.
     pub fn bytes_held(&self) -> usize {
         match self {
@@ -60,19 +76,18 @@ impl Companions {
 /// # Errors
 /// The JSON does not parse.
 pub fn sibling_paths(gltf: &[u8]) -> Result<Vec<String>, ScanError> {
-    let json = json_of_text(gltf)?;
+    Ok(paths_in(&json_of_text(gltf)?).collect())
+}
+
+/// [`sibling_paths`] of a JSON.
+pub(super) fn paths_in(json: &Value) -> impl Iterator<Item = String> {
     let list = |key: &str| {
-        json.get(key)
-            .and_then(Value::as_array)
-            .into_iter()
-            .flatten()
+        let list = json.get(key).and_then(Value::as_array);
+        list.into_iter().flatten()
     };
     let all = list("buffers").chain(list("images"));
     let uris = all.filter_map(|item| item.get("uri")?.as_str());
-    Ok(uris
-        .filter(|uri| !uri.starts_with("data:"))
-        .flat_map(paths)
-        .collect())
+    uris.filter(|uri| !uri.starts_with("data:")).flat_map(paths)
 }
 
 /// The paths of the files beside an OBJ that its `mtllib` lines may name; none of another scan. Without absolute paths, URLs, and paths that lead

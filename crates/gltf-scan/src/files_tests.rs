@@ -12,8 +12,8 @@ use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 use super::testing::Builder;
 use super::{
-    Container, PatchPoint, PatchPrimitive, Scan, ScanError, ScanLimits, Siblings, repacked,
-    sibling_paths, stripped,
+    Container, NewFile, PatchBuffer, PatchPoint, PatchPrimitive, Scan, ScanError, ScanLimits,
+    Siblings, repacked, sibling_paths, stripped,
 };
 
 const PICTURE: &[u8] = b"\x89PNG of a plaid";
@@ -235,9 +235,7 @@ fn entries_of_a_zip_are_found_however_they_are_spelled() {
                     zip.file_names().take(3).map(str::to_owned).collect()
                 };
                 assert_eq!(spelled(&before), spelled(&after));
-                let limits = ScanLimits::default();
-                let undone = super::stripped(out, &limits, Budget::unlimited()).unwrap();
-                assert_eq!(undone.unwrap().bytes, zip, "{uri} {file} {main}");
+                assert_eq!(undone(out), zip, "{uri} {file} {main}");
             }
         }
     }
@@ -250,6 +248,113 @@ fn of_two_entries_at_one_path_the_plainly_spelled_one_counts() {
         let files = names.map(|name| (name, if name == "cloth.bin" { &bin[..] } else { b"" }));
         let zip = zipped(&[files[0], files[1], ("cloth.gltf", &gltf)]);
         assert!(Scan::read(zip, &ScanLimits::default()).is_ok(), "{names:?}");
+    }
+}
+
+/// A mended scan whose patch is to be in a file of its own, and that file.
+fn mended_beside(scan: &Scan) -> (Vec<u8>, Option<NewFile>) {
+    let written = scan.write_within(&[patch()], PatchBuffer::File, Budget::unlimited());
+    let written = written.unwrap();
+    (written.bytes, written.file)
+}
+
+fn undone(mended: Vec<u8>) -> Vec<u8> {
+    let stripped = stripped(mended, &ScanLimits::default(), Budget::unlimited()).unwrap();
+    let stripped = stripped.unwrap();
+    assert!(stripped.exact);
+    stripped.bytes
+}
+
+#[test]
+fn a_patch_goes_into_a_file_beside_the_others_and_comes_out_again() {
+    let (gltf, bin) = separate("cloth.bin");
+    let mut files = siblings("cloth.bin", bin);
+    let once = read(&gltf, files.clone()).unwrap();
+    let (mended, file) = mended_beside(&once);
+    let file = file.unwrap();
+    let json: Value = serde_json::from_slice(&mended).unwrap();
+    assert_eq!(json["buffers"][1]["uri"], file.path);
+    assert!(sibling_paths(&mended).unwrap().contains(&file.path));
+    assert_eq!(undone(mended.clone()), gltf);
+    // Without its file it is named; with it, it is the scan that a data URI gives.
+    let missing = read(&mended, files.clone()).unwrap_err();
+    assert_eq!(missing.pointer(), Some("/buffers/1/uri"));
+    files.0.insert(file.path, file.bytes.into());
+    let again = read(&mended, files.clone()).unwrap();
+    let inline = read(&once.write(&[patch()]).unwrap(), files.clone()).unwrap();
+    assert_eq!(again.surface, inline.surface);
+    // A second patch on top, in a file or not.
+    let (twice, second) = mended_beside(&again);
+    assert!(second.is_some());
+    assert_eq!(undone(twice), gltf);
+    let twice = again.write(&[patch()]).unwrap();
+    assert_eq!(read(&twice, files).unwrap().parts.len(), 3);
+    assert_eq!(undone(twice), gltf);
+}
+
+#[test]
+fn in_a_zip_the_file_of_a_patch_is_an_entry_beside_the_gltf() {
+    let (gltf, bin) = separate("cloth.bin");
+    for folder in ["", "./", "a/b/", "a\\"] {
+        let [main, file] = ["cloth.gltf", "cloth.bin"].map(|name| format!("{folder}{name}"));
+        let zip = zipped(&[(&file, &bin), (&main, &gltf)]);
+        let limits = ScanLimits::default();
+        let scan = Scan::read(zip.clone(), &limits).unwrap();
+        let (mended, beside) = mended_beside(&scan);
+        assert_eq!(beside, None, "it is in the zip");
+        let again = Scan::read(mended.clone(), &limits).unwrap();
+        let inline = Scan::read(scan.write(&[patch()]).unwrap(), &limits).unwrap();
+        assert_eq!(again.surface, inline.surface, "{folder}");
+        let (twice, _) = mended_beside(&again);
+        assert_eq!(Scan::read(twice.clone(), &limits).unwrap().parts.len(), 3);
+        assert_eq!(undone(twice), zip, "{folder}");
+        assert_eq!(undone(mended.clone()), zip, "{folder}");
+        // A glTF alone would miss the file.
+        let form =
+            |container| repacked(mended.clone(), container, &limits, Budget::unlimited()).unwrap();
+        assert_eq!(form(Container::Gltf), (Container::Zip, mended.clone()));
+        let (container, glb) = form(Container::Glb);
+        assert_eq!(container, Container::Glb);
+        let packed = Scan::read(glb, &limits).unwrap();
+        assert_eq!(packed.surface, again.surface);
+    }
+}
+
+#[test]
+fn no_file_of_a_scan_is_taken_for_that_of_its_patch() {
+    let (gltf, bin) = separate("cloth.bin");
+    let files = siblings("cloth.bin", bin.clone());
+    let scan = read(&gltf, files.clone()).unwrap();
+    let name = mended_beside(&scan).1.unwrap().path;
+    let mut json: Value = serde_json::from_slice(&gltf).unwrap();
+    json["images"][0]["uri"] = json!(name);
+    let named = json.to_string().into_bytes();
+    let free = name.replace(".bin", "-2.bin");
+    // Its image is there or not, and a file may be there that it does not name.
+    let mut with_image = files.clone();
+    with_image.0.insert(name.clone(), PICTURE.into());
+    for (gltf, files) in [
+        (&named, &files),
+        (&named, &with_image),
+        (&gltf, &with_image),
+    ] {
+        let scan = read(gltf, files.clone()).unwrap();
+        assert_eq!(mended_beside(&scan).1.unwrap().path, free);
+        let mut entries: Vec<(&str, &[u8])> = vec![("cloth.gltf", gltf)];
+        entries.extend(files.0.iter().map(|(name, bytes)| (&name[..], &bytes[..])));
+        let zip = Scan::read(zipped(&entries), &ScanLimits::default()).unwrap();
+        let (mended, _) = mended_beside(&zip);
+        let names = ZipArchive::new(Cursor::new(mended)).unwrap();
+        assert!(names.file_names().any(|name| name == free));
+    }
+}
+
+#[test]
+fn a_scan_of_one_file_stays_one_file() {
+    for bytes in [Builder::square().glb(), Builder::square().gltf()] {
+        let scan = Scan::read(bytes, &ScanLimits::default()).unwrap();
+        let (mended, file) = mended_beside(&scan);
+        assert_eq!((mended, file), (scan.write(&[patch()]).unwrap(), None));
     }
 }
 

@@ -38,6 +38,7 @@ mod limits;
 mod mesh_file;
 mod pack;
 mod patch_appearance;
+mod patch_buffer;
 mod patch_group;
 #[cfg(test)]
 mod patch_group_tests;
@@ -88,6 +89,7 @@ pub use left_out::NamedPlace;
 pub use limits::ScanLimits;
 pub use pack::repacked;
 pub use patch_appearance::{OwnTexture, PatchAppearance};
+pub use patch_buffer::{NewFile, PatchBuffer};
 pub use patch_primitive::{PatchPoint, PatchPrimitive};
 pub use scan::{Scan, ScanPart};
 pub use strip::{Stripped, stripped};

@@ -13,6 +13,7 @@ use super::files::{Companions, json_of_text};
 use super::json::JsonPlace;
 use super::limits::ScanLimits;
 use super::mesh_file::mesh_container;
+use super::patch_buffer::ends_in_a_file;
 use super::scan::Scan;
 use super::undo;
 use super::zip_files::ZipFiles;
@@ -41,7 +42,8 @@ impl Scan {
 }
 
 /// The scan of a zip in another container: the glTF alone, or a GLB with all its files. Also returns the container: a zip's
-/// GLB stays a GLB, its OBJ or PLY stays one and comes alone.
+/// GLB stays a GLB, its OBJ or PLY stays one and comes alone, and a zip with a patch in a file of its own
+/// ([`PatchBuffer::File`](super::PatchBuffer)) is no glTF alone.
 ///
 /// # Errors
 /// As [`Scan::packed`]; `Exhausted`.
@@ -63,6 +65,9 @@ pub fn repacked(
             let bytes = packed(&main, &Companions::Zip(zip), &allowance)?;
             budget.check_output(bytes.len())?;
             return Ok((Container::Glb, bytes));
+        }
+        (Container::Gltf, Container::Gltf) if ends_in_a_file(&json_of_text(&main)?) => {
+            return Ok((Container::Zip, zip.bytes.to_vec()));
         }
         _ => main.to_vec(),
     };

@@ -13,6 +13,7 @@ use super::digests::FileDigests;
 use super::error::ScanError;
 use super::files::Companions;
 use super::patch_appearance::PatchAppearance;
+use super::patch_buffer::{NewFile, PatchBuffer};
 use super::patch_group::{PatchGroup, PrimitiveLook};
 use super::patch_materials::{MaterialRequest, PatchMaterialsMaker};
 use super::patch_primitive::PatchPrimitive;
@@ -27,6 +28,8 @@ pub struct WrittenScan {
     pub bytes: Vec<u8>,
     /// Of the glTF: the file, or the glTF in a zip.
     pub digests: FileDigests,
+    /// A file that the glTF refers to anew, and that is to lie beside it. In a zip it is an entry and not here.
+    pub file: Option<NewFile>,
 }
 
 impl Scan {
@@ -40,17 +43,19 @@ impl Scan {
     /// [`ScanError::InvalidPatch`] for a patch that contradicts itself or the scan, [`ScanError::Singular`] for one on
     /// a node whose transform is singular.
     pub fn write(&self, patches: &[PatchPrimitive]) -> Result<Vec<u8>, ScanError> {
-        let written = self.write_within(patches, Budget::unlimited())?;
+        let buffer = PatchBuffer::default();
+        let written = self.write_within(patches, buffer, Budget::unlimited())?;
         Ok(written.bytes)
     }
 
-    /// [`Scan::write`] within a request's budget.
+    /// [`Scan::write`] within a request's budget, with the new bytes of a glTF in a data URI or a file.
     ///
     /// # Errors
     /// As [`Scan::write`]; `Exhausted`.
     pub fn write_within(
         &self,
         patches: &[PatchPrimitive],
+        buffer: PatchBuffer,
         budget: &Budget,
     ) -> Result<WrittenScan, ScanError> {
         budget.spend(DIGEST_WORK * self.bytes.len() as u64)?;
@@ -58,6 +63,7 @@ impl Scan {
             return Ok(WrittenScan {
                 bytes: self.received().to_vec(),
                 digests: self.digests().clone(),
+                file: None,
             });
         }
         if let Some(origin) = &self.origin {
@@ -66,12 +72,16 @@ impl Scan {
             budget.spend(DIGEST_WORK * bytes.len() as u64)?;
             let digests = FileDigests::of(&bytes);
             let bytes = match &self.companions {
-                Companions::Zip(zip) => zip.with_main(&bytes)?,
+                Companions::Zip(zip) => zip.with_main(&bytes, None)?,
                 Companions::Siblings(_) => bytes,
             };
-            return Ok(WrittenScan { bytes, digests });
+            return Ok(WrittenScan {
+                bytes,
+                digests,
+                file: None,
+            });
         }
-        let mut out = Appender::new(self);
+        let mut out = Appender::new(self, buffer);
         cut_primitives(self, &mut out)?;
         let variants = Variants::of(self);
         let packet = match patches.len() {
@@ -109,14 +119,18 @@ impl Scan {
             variants.map_on_cloth(self, &mut out, budget)?;
         }
         budget.check_output(self.bytes.len() + out.appended_bytes())?;
-        let mended = out.finish()?;
+        let (mended, file) = out.finish()?;
         budget.spend(DIGEST_WORK * mended.len() as u64)?;
         let digests = FileDigests::of(&mended);
-        let bytes = match &self.companions {
-            Companions::Zip(zip) => zip.with_main(&mended)?,
-            _ => mended,
+        let (bytes, file) = match &self.companions {
+            Companions::Zip(zip) => (zip.with_main(&mended, file.as_ref())?, None),
+            Companions::Siblings(_) => (mended, file),
         };
-        Ok(WrittenScan { bytes, digests })
+        Ok(WrittenScan {
+            bytes,
+            digests,
+            file,
+        })
     }
 
     /// The digests of the scan as it was read: the file, or the glTF in a zip.

@@ -13,6 +13,7 @@ use zip::{CompressionMethod, ZipArchive, ZipWriter};
 use super::compressed::DecodeAllowance;
 use super::error::ScanError;
 use super::files::relative;
+use super::patch_buffer::NewFile;
 use super::zip_undo;
 
 /// The first bytes of a zip.
@@ -105,28 +106,31 @@ impl ZipFiles {
         path: &str,
         allowance: &DecodeAllowance<'_>,
     ) -> Result<Option<Bytes>, ScanError> {
-        let main = relative(&self.main).unwrap_or_default();
-        let folder = main.rsplit_once('/').map_or("", |(folder, _)| folder);
-        let path = relative(format!("{folder}/{path}").trim_start_matches('/'));
-        let place = path.and_then(|path| self.places.get(&path));
-        let file = place.map(|index| self.entry(*index, allowance));
+        let file = self.place(path).map(|index| self.entry(index, allowance));
         file.transpose()
     }
 
-    /// The same zip with the mended glTF, and an entry with which [`ZipFiles::before`] undoes that.
-    pub fn with_main(&self, main: &[u8]) -> Result<Vec<u8>, ScanError> {
+    /// The number of the entry at a path relative to the glTF.
+    pub fn place(&self, path: &str) -> Option<usize> {
+        let main = relative(&self.main).unwrap_or_default();
+        let folder = main.rsplit_once('/').map_or("", |(folder, _)| folder);
+        let path = relative(format!("{folder}/{path}").trim_start_matches('/'))?;
+        self.places.get(&path).copied()
+    }
+
+    /// The same zip with the mended glTF, a file that it refers to, if there is a new one, and an entry with which
+    /// [`ZipFiles::before`] undoes that.
+    pub fn with_main(&self, main: &[u8], file: Option<&NewFile>) -> Result<Vec<u8>, ScanError> {
         let number = 1 + self.undo_entries().last().map_or(0, |(number, _)| number);
-        let mended = self.with_entries(main, |_| true)?;
+        let mut mended = self.with_entries(main, |_| true)?;
+        if let Some(file) = file {
+            // As the glTF's own folder is spelled.
+            let folder = self.main.rfind(['/', '\\']).map_or(0, |at| at + 1);
+            let name = [&self.main[..folder], &file.path].concat();
+            mended = with_entry(mended, &name, &file.bytes)?;
+        }
         let undo = zip_undo::record(self, &ZipFiles::open(mended.clone().into())?)?;
-        let mut out = ZipWriter::new_append(Cursor::new(mended)).map_err(zip_error)?;
-        let options = SimpleFileOptions::default()
-            .compression_method(CompressionMethod::Deflated)
-            .large_file(u32::try_from(undo.len()).is_err());
-        out.start_file(format!("{UNDO_NAME}{number}{UNDO_ENDING}"), options)
-            .map_err(zip_error)?;
-        out.write_all(&undo)
-            .map_err(|error| broken(error.to_string()))?;
-        Ok(out.finish().map_err(zip_error)?.into_inner())
+        with_entry(mended, &format!("{UNDO_NAME}{number}{UNDO_ENDING}"), &undo)
     }
 
     /// The same zip with other bytes for the glTF, and without the entries that undo its mends.
@@ -245,6 +249,18 @@ impl ZipFiles {
         }
         Ok(bytes.into())
     }
+}
+
+/// A zip with one more entry.
+fn with_entry(zip: Vec<u8>, name: &str, bytes: &[u8]) -> Result<Vec<u8>, ScanError> {
+    let mut out = ZipWriter::new_append(Cursor::new(zip)).map_err(zip_error)?;
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Deflated)
+        .large_file(u32::try_from(bytes.len()).is_err());
+    out.start_file(name, options).map_err(zip_error)?;
+    let written = out.write_all(bytes);
+    written.map_err(|error| broken(error.to_string()))?;
+    Ok(out.finish().map_err(zip_error)?.into_inner())
 }
 
 /// The entries by their paths. Of several at one path the one counts that is spelled as the path is, else the first.

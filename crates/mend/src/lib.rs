@@ -92,6 +92,7 @@ pub use session::{ScanSession, SessionCall};
 pub use strip::strip;
 pub use timings::add_read_time;
 
+use scan_additions::PatchChoices;
 use scan_holes::ScanHoles;
 use timings::milliseconds;
 use welded_scan::WeldedScan;
@@ -114,7 +115,7 @@ pub fn mend<'a>(
         || ScanHoles::open(scan, constraints, call),
         || scan.digests(),
     );
-    holes?.mended_once(scan, constraints.texture, call)
+    holes?.mended_once(scan, constraints.into(), call)
 }
 
 /// Searches where on a hole's grid a point in space belongs: the cell where an anchor at that point brings the cloth
@@ -144,7 +145,7 @@ pub fn mend_to_target<'a>(
     let holes = ScanHoles::open(scan, &Constraints::default(), call)?;
     let found = holes.search(search, call)?;
     let filled = holes.filled_with(scan, &anchor_of(&found, search), call)?;
-    holes.mended(scan, filled, None, call)
+    holes.mended(scan, filled, PatchChoices::default(), call)
 }
 
 /// The result of a search as constraints: one soft anchor at the search's target.

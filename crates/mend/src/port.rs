@@ -77,6 +77,7 @@ impl Mender for SharedMender {
             bytes: scan.bytes,
             media_type: scan.container.media_type(),
             report,
+            file: None,
         })
     }
 

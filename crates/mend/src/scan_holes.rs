@@ -18,7 +18,7 @@ use crate::hole_share::HoleShares;
 use crate::inpainter::Inpainter;
 use crate::mender::{Call, NetworkMender};
 use crate::prepared_hole::PreparedHole;
-use crate::scan_additions::ScanAdditions;
+use crate::scan_additions::{PatchChoices, ScanAdditions};
 use crate::scan_notes;
 use crate::scan_search::searched_hole;
 use crate::select::{HoleRequest, Selection};
@@ -335,7 +335,7 @@ impl ScanHoles {
         })
     }
 
-    /// The scan with the patches of the filled holes, coloured as asked for, and the report.
+    /// The scan with the patches of the filled holes, coloured and stored as asked for, and the report.
     ///
     /// # Errors
     /// When the patches cannot be written; `Exhausted`.
@@ -343,11 +343,11 @@ impl ScanHoles {
         &self,
         scan: &Scan,
         filled: FilledScan,
-        texture: Option<TextureChoice>,
+        choices: PatchChoices,
         call: Call,
     ) -> Result<Mended, MendError> {
-        let additions = self.additions(scan, filled, texture, call)?;
-        additions.written(scan, self.seen(scan), call)
+        let additions = self.additions(scan, filled, choices.texture, call)?;
+        additions.written(scan, self.seen(scan), choices.buffer, call)
     }
 
     /// The same, for holes that nothing else is asked of: their memory is free when the answer is written.
@@ -357,12 +357,13 @@ impl ScanHoles {
     pub fn mended_once(
         self,
         scan: &Scan,
-        texture: Option<TextureChoice>,
+        choices: PatchChoices,
         call: Call,
     ) -> Result<Mended, MendError> {
-        let additions = self.additions(scan, self.filled(call)?, texture, call)?;
+        let additions = self.additions(scan, self.filled(call)?, choices.texture, call)?;
         let cut = self.into_cut();
-        additions.written(scan, cut.as_ref().unwrap_or(scan), call)
+        let seen = cut.as_ref().unwrap_or(scan);
+        additions.written(scan, seen, choices.buffer, call)
     }
 
     /// What the filled holes add to the scan, coloured as asked for, and the report.

@@ -142,12 +142,10 @@ impl<'a> SessionCall<'a> {
     /// As [`mend`](crate::mend).
     pub fn mended(&self, constraints: &Constraints) -> Result<Mended, MendError> {
         let filled = self.filled(constraints)?;
-        let mut mended = self.session.holes.mended(
-            &self.session.scan,
-            filled,
-            constraints.texture,
-            self.call,
-        )?;
+        let mut mended =
+            self.session
+                .holes
+                .mended(&self.session.scan, filled, constraints.into(), self.call)?;
         self.session.remove_preparation(&mut mended.report);
         Ok(mended)
     }

@@ -34,6 +34,7 @@ impl Mender for Echo {
             bytes,
             media_type: "model/gltf-binary",
             report,
+            file: None,
         })
     }
 

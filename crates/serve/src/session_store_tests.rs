@@ -54,6 +54,7 @@ impl EditSession for SizedSession {
             bytes,
             media_type: GLB,
             report,
+            file: None,
         })
     }
 

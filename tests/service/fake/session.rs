@@ -70,6 +70,7 @@ impl EditSession for FakeSession {
             bytes: format!("glTF {} {xs:?}", self.scan.name).into_bytes(),
             media_type: "model/gltf-binary",
             report: report(constraints),
+            file: None,
         })
     }
 

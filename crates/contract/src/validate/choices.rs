@@ -20,6 +20,16 @@ pub enum TextureChoice {
     None,
 }
 
+/// Where the patches of a glTF go that came in several files.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum PatchBuffer {
+    /// Into the glTF, in a data URI.
+    #[default]
+    Data,
+    /// Into a file of their own.
+    File,
+}
+
 /// Kinds of loops to fill. None of them includes outer boundaries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fill {
@@ -57,6 +67,21 @@ impl FieldErrors {
                 let detail =
                     format!("expected `synthesize`, `continue`, `flat` or `none`; got `{got}`");
                 self.push("/texture", detail);
+                None
+            }
+        }
+    }
+
+    pub(super) fn patch_buffer(&mut self, buffer: &str) -> Option<PatchBuffer> {
+        match buffer {
+            "data" => Some(PatchBuffer::Data),
+            "file" => Some(PatchBuffer::File),
+            other => {
+                let got = excerpt(other);
+                self.push(
+                    "/patchBuffer",
+                    format!("expected `data` or `file`; got `{got}`"),
+                );
                 None
             }
         }
