@@ -11,7 +11,7 @@ use std::path::PathBuf;
 pub struct StripArgs {
     /// The mended scan: GLB; glTF, whose other files are not needed; or a zip
     scan: PathBuf,
-    /// Where the scan without what darn put in goes, in the container the mended one came in
+    /// Where the scan without what darn put in goes, in the container the mended one came in; another folder gets its files, too
     #[arg(short, long)]
     output: PathBuf,
     /// Where the report goes, as JSON
@@ -30,6 +30,12 @@ pub fn run(args: &StripArgs) -> Result<(), Failure> {
     let scan = files::read(&args.scan)?;
     let stripped = darn_mend::strip(scan, ScanForm::AsReceived, &args.size.limits(), &budget)
         .or_fail(format!("strip {name}"))?;
+    if args.output.parent() != args.scan.parent() {
+        let beside = files::read_files_of(&args.scan, &stripped.bytes)?;
+        let each = beside.0.iter();
+        let each = each.map(|(path, bytes)| (path.as_str(), bytes.as_ref()));
+        files::write_files_of(&args.output, each)?;
+    }
     files::write(&args.output, &stripped.bytes)?;
     if let Some(path) = &args.report {
         files::write(path, &files::json(&stripped.report, "write the report")?)?;

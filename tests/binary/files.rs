@@ -2,6 +2,7 @@
 
 use super::EXAMPLE;
 use super::commands::{holes, zipped};
+use super::darn;
 use super::running::{self, Service};
 
 /// A URI of a glTF, the name of the part or zip entry that its sender gives to the file, and the file's path beside the glTF.
@@ -95,4 +96,78 @@ fn the_command_reads_siblings_however_their_uri_is_spelled() {
         std::fs::write(&scan, gltf).expect("written");
         assert_eq!(holes(&scan), expected, "{uri}");
     }
+}
+
+/// The names of a zip's entries.
+fn entries(zip: &[u8]) -> Vec<String> {
+    let archive = zip::ZipArchive::new(std::io::Cursor::new(zip)).expect("a zip");
+    archive.file_names().map(str::to_owned).collect()
+}
+
+#[tokio::test]
+async fn a_patch_comes_in_a_file_of_its_own_where_that_is_asked_for() {
+    const ASKED: &str = r#"{"patchBuffer": "file"}"#;
+    let is_of_patch = |name: &&String| name.starts_with("darn-patch-") && name.ends_with(".bin");
+    let (gltf, bin) = separate("cloth.bin");
+    let service = Service::start();
+    service.ready().await;
+    let post = async |path: &str, media_type: &str, accept: &str, body: Vec<u8>| {
+        let request = running::client().post(service.url(path)).body(body);
+        let request = request.header("content-type", media_type);
+        let answer = request.header("accept", accept).send().await;
+        let answer = answer.expect("an answer");
+        assert_eq!(answer.status(), 200);
+        let kind = answer.headers()["content-type"].to_str().expect("text");
+        (kind.to_owned(), answer.bytes().await.expect("a body"))
+    };
+    let parts: [(&str, &[u8]); 3] = [
+        ("scan", &gltf),
+        ("cloth.bin", bin),
+        ("constraints", ASKED.as_bytes()),
+    ];
+    let form_data = "multipart/form-data; boundary=cut";
+    for accept in ["*/*", "model/gltf+json"] {
+        let (kind, zip) = post("/inpaint", form_data, accept, form(&parts)).await;
+        assert_eq!(kind, "application/zip", "a glTF alone would miss the file");
+        assert_eq!(entries(&zip).iter().filter(is_of_patch).count(), 1);
+        let (_, before) = post("/strip", &kind, "model/gltf+json", zip.to_vec()).await;
+        assert!(before == gltf);
+    }
+    let (kind, _) = post("/inpaint", form_data, "model/gltf-binary", form(&parts)).await;
+    assert_eq!(kind, "model/gltf-binary");
+
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name);
+    for (name, bytes) in [
+        ("cloth.gltf", &gltf[..]),
+        ("cloth.bin", bin),
+        ("asked.json", ASKED.as_bytes()),
+    ] {
+        std::fs::write(path(name), bytes).expect("written");
+    }
+    let run = |arguments: &[&str]| {
+        let mut command = darn();
+        command.current_dir(folder.path()).args(arguments);
+        let done = command.output().expect("darn runs");
+        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert!(done.status.success(), "{arguments:?}: {said}");
+    };
+    for output in ["out/mended.gltf", "mended.glb"] {
+        std::fs::create_dir_all(path("out")).expect("a folder");
+        run(&["inpaint", "cloth.gltf", "-o", output, "-c", "asked.json"]);
+        run(&["holes", output]);
+    }
+    let names_in = |folder: &str| -> Vec<String> {
+        let list = std::fs::read_dir(path(folder)).expect("a folder");
+        let name = |entry: std::fs::DirEntry| entry.file_name().to_string_lossy().into_owned();
+        list.map(|entry| name(entry.expect("an entry"))).collect()
+    };
+    let names = names_in("out");
+    assert_eq!(names.iter().filter(is_of_patch).count(), 1, "{names:?}");
+    // The scan from before goes into another folder with its files, and without the patch's.
+    std::fs::create_dir_all(path("back")).expect("a folder");
+    run(&["strip", "out/mended.gltf", "-o", "back/cloth.gltf"]);
+    let read = |name: &str| std::fs::read(path(name)).expect("a file");
+    assert!(read("back/cloth.gltf") == gltf && read("back/cloth.bin") == bin);
+    assert_eq!(names_in("back").iter().filter(is_of_patch).count(), 0);
 }

@@ -56,6 +56,23 @@ fn the_materials_of_an_obj_go_where_it_goes() {
         .status();
     assert!(mended.expect("darn runs").success());
     check(alone.parent().expect("a folder"), "mended.obj");
+    let back = folder.path().join("back/cloth.obj");
+    std::fs::create_dir_all(back.parent().expect("a folder")).expect("made");
+    let stripped = darn()
+        .arg("strip")
+        .arg(&alone)
+        .arg("-o")
+        .arg(&back)
+        .output();
+    assert!(stripped.expect("darn runs").status.success());
+    for (name, bytes) in [
+        ("cloth.obj", obj().as_bytes()),
+        ("my cloth.mtl", MTL.as_bytes()),
+        ("maps/my linen.png", PICTURE),
+    ] {
+        let there = std::fs::read(folder.path().join("back").join(name));
+        assert_eq!(there.expect("a file"), bytes, "{name}");
+    }
     let batch = folder.path().join("c/d");
     let mended = darn()
         .args(["inpaint", "--batch"])
