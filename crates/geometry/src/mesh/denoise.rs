@@ -8,6 +8,8 @@
 //! twice.
 
 mod coherence;
+#[cfg(test)]
+mod decimation;
 
 use coherence::is_coherent;
 use darn_budget::{Budget, Exhausted};
