@@ -17,7 +17,7 @@ use darn_contract::port::{
     EditSession, HolesQuery, MapSpan, Mended, Mender, PatchForm, Patches, Refusal, ScanForm,
     Stripped,
 };
-use darn_contract::{Anchor, Code, Constraints, FieldError, Search, codes, v1};
+use darn_contract::{Anchor, Code, Constraints, FieldError, Outcome, Search, codes, v1};
 use serde_json::{Value, json};
 
 use session::FakeSession;
@@ -75,9 +75,13 @@ impl Behaviour {
                 code("too_many_faces", codes::SCAN_TOO_LARGE),
                 "5000001 triangles; the limit is 4000000",
             ),
-            Self::RefuseNotADisk => {
-                Refusal::new(codes::NOT_A_DISK, "region around loop 3 has 1 handle")
-            }
+            Self::RefuseNotADisk => Refusal {
+                outcome: Some(Outcome {
+                    skipped: 1,
+                    ..Outcome::default()
+                }),
+                ..Refusal::new(codes::NOT_A_DISK, "region around loop 3 has 1 handle")
+            },
             Self::RefuseUnknownHole => Refusal {
                 code: code("unknown_hole", codes::CONSTRAINTS_DO_NOT_FIT),
                 detail: "the scan has no such hole".to_owned(),
@@ -85,6 +89,7 @@ impl Behaviour {
                     "/holes/0/id",
                     "there is no loop 9; loops are 0 to 3",
                 )],
+                outcome: None,
             },
             Self::FailInternally => Refusal::new(codes::INTERNAL, "/srv/secret/weights is gone"),
         };

@@ -156,6 +156,8 @@ async fn a_process_without_workers_has_others_mend() {
     assert_eq!(refused.metadata().get("darn-code").unwrap(), "no_workers");
     // That of gRPC which is `POST /inpaint` is handed over like it.
     let answer = grpc.inpaint(chunks("wool", None)).await.unwrap();
+    let result = answer.metadata().get("darn-result").unwrap();
+    assert_eq!(result, "filled=1 skipped=0 doubtful=0");
     let (holes, bytes) = parts(answer.into_inner()).await;
     assert_eq!((holes, bytes), (1, FakeScan::named("wool").mended()));
     let refused = grpc.inpaint(chunks(Behaviour::RefuseNotADisk, None)).await;

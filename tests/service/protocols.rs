@@ -152,11 +152,10 @@ async fn grpc_shares_the_port() {
         anchors: vec![anchor],
         ..Default::default()
     };
-    let mut answer = client
-        .inpaint(chunks("cloth", Some(asked)))
-        .await
-        .unwrap()
-        .into_inner();
+    let answer = client.inpaint(chunks("cloth", Some(asked))).await.unwrap();
+    let result = answer.metadata().get("darn-result").unwrap();
+    assert_eq!(result, "filled=1 skipped=0 doubtful=0");
+    let mut answer = answer.into_inner();
     let Some(ChunkPart::Report(report)) = answer.message().await.unwrap().unwrap().part else {
         panic!("the report comes first");
     };
@@ -248,6 +247,9 @@ async fn grpc_has_the_codes_of_http() {
         let status = answer.expect_err(word);
         assert_eq!(status.code(), code, "{word}");
         assert_eq!(status.metadata().get("darn-code").unwrap(), word);
+        let result = status.metadata().get("darn-result");
+        let expected = (word == "not_a_disk").then_some("filled=0 skipped=1 doubtful=0");
+        assert_eq!(result.map(|r| r.to_str().unwrap()), expected, "{word}");
         let document = status
             .metadata()
             .get_bin("darn-problem-bin")

@@ -14,7 +14,7 @@ fn failed(skipped: &&v1::Skipped) -> bool {
 const NON_MANIFOLD: &str = "non_manifold";
 
 /// How a mend went: `filled=3 skipped=1 doubtful=0`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Outcome {
     /// Holes that were filled.
     pub filled: usize,

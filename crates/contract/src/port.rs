@@ -5,7 +5,7 @@
 use bytes::Bytes;
 use darn_budget::Budget;
 
-use crate::{Code, Constraints, FieldError, Search, codes, v1};
+use crate::{Code, Constraints, FieldError, Outcome, Search, codes, v1};
 
 /// What is wanted beside a scan's boundary loops.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -141,6 +141,9 @@ pub trait EditSession: Send + Sync + 'static {
     /// The session as its opener sees it; the service fills in `id` and `idle_seconds`.
     fn described(&self) -> v1::Session;
 
+    /// How its holes were filled when it was opened.
+    fn outcome(&self) -> Outcome;
+
     /// Memory held, in bytes, estimated. Read again after every call, since it may grow.
     fn bytes(&self) -> usize;
 
@@ -241,6 +244,8 @@ pub struct Refusal {
     pub detail: String,
     /// The constraints at fault, if any.
     pub fields: Vec<FieldError>,
+    /// How the mend went, where it came as far as the scan's holes.
+    pub outcome: Option<Outcome>,
 }
 
 impl Refusal {
@@ -250,6 +255,7 @@ impl Refusal {
             code,
             detail: detail.into(),
             fields: Vec::new(),
+            outcome: None,
         }
     }
 

@@ -1,7 +1,7 @@
 //! Why a scan could not be mended, and the code of each reason: a stable word for programs.
 
 use darn_budget::Exhausted;
-use darn_contract::{Code, FieldError, codes, v1};
+use darn_contract::{Code, FieldError, Outcome, codes, v1};
 use darn_geometry::flatten::FlattenError;
 use darn_geometry::mesh::region::RegionError;
 use darn_geometry::patch::PatchError;
@@ -251,6 +251,19 @@ impl MendError {
             | MendError::NoPlausibleFill { hole, .. } => Some(*hole),
             _ => None,
         }
+    }
+
+    /// How the mend went, where it came as far as the scan's holes: none of them was filled.
+    pub fn outcome(&self) -> Option<Outcome> {
+        let skipped = match self {
+            MendError::NoHoles { .. } => 0,
+            MendError::NoneFilled { holes, .. } => *holes,
+            error => error.hole().map(|_| 1)?,
+        };
+        Some(Outcome {
+            skipped,
+            ..Outcome::default()
+        })
     }
 
     /// The fields of the constraints that the error is about.

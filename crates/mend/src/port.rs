@@ -9,7 +9,7 @@ use darn_contract::port::{
     EditSession, HolesQuery, MapSpan, Mended, Mender, PatchForm, Patches, Refusal, ScanForm,
     Stripped,
 };
-use darn_contract::{Constraints, Search, error_chain, v1};
+use darn_contract::{Constraints, Outcome, Search, error_chain, v1};
 use darn_geometry::mesh::Vec3;
 use darn_gltf_scan::{Container, Scan};
 
@@ -158,6 +158,10 @@ impl EditSession for ScanSession {
         ScanSession::described(self)
     }
 
+    fn outcome(&self) -> Outcome {
+        ScanSession::outcome(self)
+    }
+
     fn bytes(&self) -> usize {
         ScanSession::bytes(self)
     }
@@ -224,6 +228,7 @@ fn refusal(error: MendError) -> Refusal {
         code: error.code(),
         detail: error_chain(&error),
         fields: error.fields(),
+        outcome: error.outcome(),
     }
 }
 
@@ -248,5 +253,22 @@ mod tests {
         let refusal = refusal(error);
         assert_eq!(refusal.code, codes::COORDINATES_TOO_LARGE);
         assert_eq!(refusal.detail, text);
+    }
+
+    #[test]
+    fn a_refusal_says_how_it_went_where_it_came_as_far_as_the_holes() {
+        let outcome = |error| refusal(error).outcome.map(|outcome| outcome.to_string());
+        let narrow = || MendError::NoCells { hole: 3 };
+        let none = MendError::NoneFilled {
+            holes: 2,
+            first: Box::new(narrow()),
+        };
+        let nothing = MendError::NoHoles {
+            skipped: Vec::new(),
+        };
+        assert_eq!(outcome(narrow()).unwrap(), "filled=0 skipped=1 doubtful=0");
+        assert_eq!(outcome(none).unwrap(), "filled=0 skipped=2 doubtful=0");
+        assert_eq!(outcome(nothing).unwrap(), "filled=0 skipped=0 doubtful=0");
+        assert_eq!(outcome(MendError::NothingToStrip), None);
     }
 }

@@ -11,10 +11,10 @@ use crate::mender::{Call, NetworkMender};
 use crate::prepared_hole::PreparedHole;
 use crate::scan_additions::ScanAdditions;
 use crate::scan_holes::{FilledScan, ScanHoles};
-use crate::session_description;
+use crate::session_description::{self, Described};
 use darn_budget::Budget;
 use darn_contract::port::{MapSpan, Mended};
-use darn_contract::{Constraints, FieldError, Search, v1};
+use darn_contract::{Constraints, FieldError, Outcome, Search, v1};
 use darn_geometry::mesh::Vec3;
 use darn_gltf_scan::export::{ColouredMesh, MeshLook, NewMesh, coloured_meshes};
 use darn_gltf_scan::{PatchPoint, PatchPrimitive, Scan};
@@ -24,7 +24,7 @@ pub struct ScanSession {
     scan: Scan,
     holes: ScanHoles,
     mender: Arc<NetworkMender>,
-    described: v1::Session,
+    described: Described,
 }
 
 impl ScanSession {
@@ -70,15 +70,20 @@ impl ScanSession {
     pub fn described(&self) -> v1::Session {
         v1::Session {
             bytes: self.bytes() as u64,
-            ..self.described.clone()
+            ..self.described.session.clone()
         }
+    }
+
+    /// How its holes were filled when it was opened.
+    pub fn outcome(&self) -> Outcome {
+        self.described.outcome
     }
 
     /// Bytes of memory that it holds, estimated: half as much again as is counted, as allocators round up and sparse
     /// factors fill in. Measured: a thousand sessions counted at 4.2 MiB each took 6.0 MiB each.
     pub fn bytes(&self) -> usize {
         let holes: usize = self.holes.holes.iter().map(PreparedHole::bytes).sum();
-        let described = session_description::bytes(&self.described);
+        let described = session_description::bytes(&self.described.session);
         let counted = self.scan.bytes_held() + self.holes.bytes() + holes + described;
         counted + counted / 2
     }
@@ -196,7 +201,7 @@ impl<'a> SessionCall<'a> {
             described,
             ..
         } = self.session;
-        let listed = described.holes.iter().map(|hole| hole.id).collect();
+        let listed = described.session.holes.iter().map(|hole| hole.id).collect();
         let drafts = holes.drafts_of(scan, constraints, &listed, self.call)?;
         let each = (drafts.par_iter())
             .map(|draft| vertex_normals_at_seam(&draft.patch, draft.hole.region()));

@@ -5,34 +5,44 @@ use crate::hole_report::FilledHole;
 use crate::mender::Call;
 use crate::picture;
 use crate::scan_holes::{FilledScan, ScanHoles};
-use darn_contract::v1;
+use darn_contract::{Outcome, v1};
 use darn_geometry::mesh::index::VertexId;
 use darn_geometry::mesh::{Vec2, Vec3};
 use darn_gltf_scan::{PatchPrimitive, Scan};
 
-/// The session in the contract's words, without `id` and `idle_seconds`.
+/// What a session tells of itself.
+pub struct Described {
+    /// The session in the contract's words, without `id` and `idle_seconds`.
+    pub session: v1::Session,
+    /// How its holes were filled.
+    pub outcome: Outcome,
+}
+
+/// Describes a session.
 ///
 /// # Errors
 /// A hole that cannot be filled, a chart that cannot be drawn; `Exhausted`.
-pub fn described(opened: &ScanHoles, scan: &Scan, call: Call) -> Result<v1::Session, MendError> {
+pub fn described(opened: &ScanHoles, scan: &Scan, call: Call) -> Result<Described, MendError> {
     let filled = opened.filled(call)?;
     let mut holes = Vec::with_capacity(filled.holes.len());
     for hole in &filled.holes {
         holes.push(hole_described(opened, scan, &filled, hole, call)?);
     }
     let report = opened.report(scan, filled);
+    let outcome = Outcome::of(&report);
     let skipped = report.skipped.into_iter().map(|loop_| v1::Skipped {
         rim_positions: rim_of(opened, loop_.id),
         ..loop_
     });
-    Ok(v1::Session {
+    let session = v1::Session {
         holes,
         skipped: skipped.collect(),
         weights: report.weights,
         notes: report.notes,
         cut_faces: cut_faces(opened, scan),
         ..Default::default()
-    })
+    };
+    Ok(Described { session, outcome })
 }
 
 /// Bytes of memory of a description.

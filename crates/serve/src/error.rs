@@ -1,7 +1,7 @@
 //! Every error that a caller can receive, with its row in the contract's table of error codes.
 
 use darn_contract::port::Refusal;
-use darn_contract::{Code, FieldError, JsonError, codes};
+use darn_contract::{Code, FieldError, JsonError, Outcome, codes};
 use darn_jobs::{JobError, State};
 use tracing::{error, warn};
 use uuid::Uuid;
@@ -343,6 +343,14 @@ impl RequestError {
             Self::Invalid { fields, .. } => fields,
             Self::Refused(refusal) => &refusal.fields,
             _ => &[],
+        }
+    }
+
+    /// How the mend went, where it came as far as the scan's holes.
+    pub fn outcome(&self) -> Option<Outcome> {
+        match self {
+            Self::Refused(refusal) => refusal.outcome,
+            _ => None,
         }
     }
 

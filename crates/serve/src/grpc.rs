@@ -10,7 +10,7 @@ use super::{
     body::ScanRequest,
     client::Caller,
     error::RequestError,
-    grpc_chunks::{ChunkStream, MAX_MESSAGE_BYTES, collect},
+    grpc_chunks::{ChunkStream, MAX_MESSAGE_BYTES, collect, insert_result},
     grpc_handover,
     job_request::KeptConstraints,
     parameters::Parameters,
@@ -20,7 +20,7 @@ use super::{
 };
 use darn_contract::port::{HolesQuery, Mended, ScanForm, Stripped};
 use darn_contract::{
-    Constraints, Search,
+    Constraints, Outcome, Search,
     v1::{self, AnchorFound, HolesReport, InpaintChunk, ScanChunk, StripChunk},
 };
 
@@ -59,12 +59,16 @@ impl Darn for GrpcService {
         request: Request<Streaming<ScanChunk>>,
     ) -> Result<Response<MendedChunks>, Status> {
         if !self.0.has_workers() {
-            let result = grpc_handover::inpaint_elsewhere(&self.0, request).await?;
-            return Ok(Response::new(Box::pin(result)));
+            let answer = grpc_handover::inpaint_elsewhere(&self.0, request).await?;
+            return Ok(answer.map(|chunks| Box::pin(chunks) as MendedChunks));
         }
         let id = request_id(&request);
         let mended = self.mend(request).await.map_err(|error| error.grpc(&id))?;
-        Ok(Response::new(Box::pin(ChunkStream::of_mended(mended))))
+        let result = Outcome::of(&mended.report).to_string();
+        let chunks: MendedChunks = Box::pin(ChunkStream::of_mended(mended));
+        let mut response = Response::new(chunks);
+        insert_result(response.metadata_mut(), &result);
+        Ok(response)
     }
 
     async fn strip(

@@ -6,7 +6,11 @@ use std::{
 };
 
 use bytes::Bytes;
-use tonic::{Code, Status, Streaming, codegen::tokio_stream::Stream};
+use tonic::{
+    Code, Status, Streaming,
+    codegen::tokio_stream::Stream,
+    metadata::{MetadataMap, MetadataValue},
+};
 
 use super::{app::App, body::BodyTimer, counted::CountedBytes, error::RequestError};
 use darn_contract::port::{Mended, Stripped};
@@ -19,6 +23,13 @@ use darn_contract::{
 pub const CHUNK_BYTES: usize = 256 << 10;
 /// Most bytes of an incoming message. Decoded, its nested messages take up to 36 times as much memory: about the default body limit.
 pub const MAX_MESSAGE_BYTES: usize = 4 << 20;
+
+/// Says in an answer's metadata how a mend went, as the header `darn-result` does over HTTP.
+pub fn insert_result(metadata: &mut MetadataMap, result: &str) {
+    if let Ok(value) = MetadataValue::try_from(result) {
+        metadata.insert("darn-result", value);
+    }
+}
 
 /// A chunk with bytes of a scan.
 pub trait DataChunk {

@@ -2,14 +2,14 @@
 
 use bytes::Bytes;
 use darn_jobs::{Job, Jobs, State};
-use tonic::{Request, Status, Streaming, metadata::MetadataValue};
+use tonic::{Request, Response, Status, Streaming, metadata::MetadataValue};
 
 use super::{
     app::App,
     client::Caller,
     error::RequestError,
     grpc::{ChunkParameters, request_id, without_others},
-    grpc_chunks::Chunks,
+    grpc_chunks::{Chunks, insert_result},
     grpc_jobs::FileChunks,
     job_input::Inlet,
     job_message,
@@ -29,7 +29,7 @@ use darn_contract::{port::ScanForm, v1::ScanChunk};
 pub async fn inpaint_elsewhere(
     app: &App,
     request: Request<Streaming<ScanChunk>>,
-) -> Result<FileChunks, Status> {
+) -> Result<Response<FileChunks>, Status> {
     let id = request_id(&request);
     let caller = Caller::of(request.extensions());
     let jobs = app.jobs.as_ref().filter(|_| caller.may_hand_over());
@@ -42,9 +42,15 @@ pub async fn inpaint_elsewhere(
     match job.state {
         State::Waiting | State::Running => Err(unfinished(app, &job, &id)),
         State::Error => Err(job_message::failure(&job).grpc(&id)),
-        State::Done | State::Cancelled => FileChunks::of_result(jobs, job.id)
-            .await
-            .map_err(|error| error.grpc(&id)),
+        State::Done | State::Cancelled => {
+            let chunks = FileChunks::of_result(jobs, job.id).await;
+            let mut response = Response::new(chunks.map_err(|error| error.grpc(&id))?);
+            let answer = job_message::kept_answer(&job);
+            if let Some(result) = answer.as_ref().and_then(|answer| answer.result()) {
+                insert_result(response.metadata_mut(), result);
+            }
+            Ok(response)
+        }
     }
 }
 

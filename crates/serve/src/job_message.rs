@@ -176,6 +176,7 @@ pub fn failure(job: &Job) -> RequestError {
         code: *code,
         detail: problem.detail,
         fields: problem.errors.into_iter().map(field).collect(),
+        outcome: None,
     })
 }
 

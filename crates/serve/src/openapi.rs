@@ -172,10 +172,7 @@ fn mended(description: &str, part: &str, media_types: &[&str]) -> Value {
         ),
         "headers": {
             "darn-holes-filled": { "description": "Holes filled", "schema": { "type": "integer" } },
-            "darn-result": {
-                "description": "How it went: `filled=3 skipped=1 doubtful=0`; skipped are holes that should have been filled and could not be",
-                "schema": { "type": "string" }
-            },
+            "darn-result": mend_result(),
             "repr-digest": repr_digest(),
             "etag": { "description": "The body's SHA-256; absent with multipart/mixed", "schema": { "type": "string" } },
             "cache-status": {
@@ -190,6 +187,13 @@ fn mended(description: &str, part: &str, media_types: &[&str]) -> Value {
             },
         },
         "content": content,
+    })
+}
+
+fn mend_result() -> Value {
+    json!({
+        "description": "How it went: `filled=3 skipped=1 doubtful=0`; skipped are holes that should have been filled and could not be",
+        "schema": { "type": "string" },
     })
 }
 
@@ -272,6 +276,8 @@ fn responses(status: &str, success: Value, unprocessable: &str) -> Value {
     ] {
         all.insert(status.to_owned(), refused(description));
     }
+    // Where a mend came as far as the scan's holes.
+    all["422"]["headers"] = json!({ "darn-result": mend_result() });
     Value::Object(all)
 }
 

@@ -8,7 +8,10 @@ use axum::{
 use serde::Serialize;
 use tonic::metadata::MetadataValue;
 
-use super::{error::RequestError, media_types::PROBLEM_JSON};
+use super::{
+    error::RequestError, grpc_chunks::insert_result, media_types::PROBLEM_JSON,
+    response::result_header,
+};
 use darn_contract::cut;
 
 /// Most bytes of one text of an error, whatever the mender says in it.
@@ -53,6 +56,9 @@ impl RequestError {
         headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
         if let Some(seconds) = self.retry_after() {
             headers.insert(header::RETRY_AFTER, HeaderValue::from(seconds));
+        }
+        if let Some(outcome) = self.outcome() {
+            headers.extend(result_header(&outcome));
         }
         if let Some(challenge) = self.challenge() {
             headers.insert(header::WWW_AUTHENTICATE, challenge);
@@ -105,6 +111,9 @@ impl RequestError {
         metadata.insert_bin("darn-problem-bin", MetadataValue::from_bytes(&document));
         if let Some(seconds) = self.retry_after() {
             metadata.insert("retry-after", MetadataValue::from(seconds));
+        }
+        if let Some(outcome) = self.outcome() {
+            insert_result(metadata, &outcome.to_string());
         }
         status
     }

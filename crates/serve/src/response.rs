@@ -280,13 +280,18 @@ impl FilePart {
     }
 }
 
+/// The header that says how it went.
+pub fn result_header(outcome: &Outcome) -> Option<(HeaderName, HeaderValue)> {
+    let value = HeaderValue::try_from(outcome.to_string()).ok()?;
+    Some((RESULT, value))
+}
+
 fn report_headers(report: &v1::Report) -> HeaderMap {
     let mut headers = HeaderMap::from_iter([
         (HOLES_FILLED, HeaderValue::from(report.holes.len())),
         (LOOPS_SKIPPED, HeaderValue::from(report.skipped.len())),
     ]);
-    let result = Outcome::of(report).to_string();
-    headers.extend(HeaderValue::try_from(result).map(|value| (RESULT, value)));
+    headers.extend(result_header(&Outcome::of(report)));
     let distances = report.holes.iter().flat_map(|hole| {
         let anchors = hole.anchors.iter().map(|anchor| anchor.distance);
         anchors.chain(hole.edits.iter().map(|edit| edit.distance))

@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Instant};
 use axum::{
     Router,
     extract::{FromRequestParts, Path, Request, State},
-    http::{StatusCode, header, request::Parts},
+    http::{HeaderMap, StatusCode, header, request::Parts},
     response::{IntoResponse, Response},
     routing::{get, post},
 };
@@ -21,7 +21,7 @@ use super::{
     error::RequestError,
     media_types::{GLB, GLTF, JSON, MULTIPART_MIXED, NDJSON, OBJ, OCTET_STREAM, PLY},
     parameters::{self, Parameters},
-    response::{self, MendResponse},
+    response::{self, MendResponse, result_header},
     session_store::SessionError,
 };
 use darn_contract::port::PatchForm;
@@ -77,16 +77,18 @@ async fn open(State(app): State<Arc<App>>, request: Request) -> Result<Response,
             ..session.described()
         };
         let text = session_json(described, id, idle_seconds);
-        Ok((session, text))
+        let result = result_header(&session.outcome());
+        Ok((session, text, result))
     });
     // Inserted only while the caller still waits: an abandoned session must not evict another.
-    let (session, text) = job.await?;
+    let (session, text, result) = job.await?;
     run_blocking(move || sessions.insert(id, opener, session, Instant::now())).await?;
     let headers = [
         (header::CONTENT_TYPE, JSON.to_owned()),
         (header::LOCATION, format!("/sessions/{id}")),
     ];
-    Ok((StatusCode::CREATED, headers, text).into_response())
+    let result: HeaderMap = result.into_iter().collect();
+    Ok((StatusCode::CREATED, headers, result, text).into_response())
 }
 
 async fn describe(

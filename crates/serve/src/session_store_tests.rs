@@ -12,7 +12,7 @@ use crate::kept_session::OVERHEAD;
 use crate::telemetry::Metrics;
 use darn_budget::{Budget, Limits};
 use darn_contract::port::{MapSpan, Mended, PatchForm, Patches, Refusal};
-use darn_contract::{Anchor, Constraints, Search, v1};
+use darn_contract::{Anchor, Constraints, Outcome, Search, v1};
 
 const IDLE: Duration = Duration::from_secs(60);
 
@@ -31,6 +31,10 @@ impl Drop for SizedSession {
 impl EditSession for SizedSession {
     fn described(&self) -> v1::Session {
         v1::Session::default()
+    }
+
+    fn outcome(&self) -> Outcome {
+        Outcome::default()
     }
 
     fn bytes(&self) -> usize {

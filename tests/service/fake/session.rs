@@ -37,6 +37,13 @@ impl EditSession for FakeSession {
         }
     }
 
+    fn outcome(&self) -> Outcome {
+        Outcome {
+            filled: 1,
+            ..Outcome::default()
+        }
+    }
+
     fn bytes(&self) -> usize {
         self.scan.kept_bytes
     }

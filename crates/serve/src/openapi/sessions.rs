@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::{body, found, mended, reference, refused, responses};
+use super::{body, found, mend_result, mended, reference, refused, responses};
 use crate::media_types::{GLB, GLTF, JSON, NDJSON, OCTET_STREAM};
 
 /// `POST /sessions`.
@@ -10,6 +10,7 @@ pub(super) fn open() -> Value {
     let mut opened = described("Kept; constraints alone can be sent from now on");
     opened["headers"] = json!({
         "location": { "description": "The session's path", "schema": { "type": "string", "format": "uri-reference" } },
+        "darn-result": mend_result(),
     });
     json!({
         "summary": "Keep a scan for editing",
