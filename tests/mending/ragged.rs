@@ -138,3 +138,53 @@ fn a_scrap_above_a_hole_is_left() {
         assert_eq!(after.topology.components, 2);
     }
 }
+        let said = report
+            .notes
+            .iter()
+            .any(|n| n.contains("float over or under"));
+        assert!(said, "{:?}", report.notes);
+    }
+}
+
+#[test]
+fn a_patch_meets_an_island_that_has_a_hole_of_its_own() {
+    let round = |u: f64, v: f64| (u - 0.5).hypot(v - 0.5);
+    let keep = move |u: f64, v: f64| {
+        let r = round(u, v);
+        r > 0.32 || (0.07 < r && r < 0.2)
+    };
+    let bytes = packed(&sheet(48, keep, |u, v| Vec3::new(u, v, waves(u, v))), &[]);
+    let mended = mended(&bytes, &Constraints::default()).expect("two holes");
+    let after = MendedScan::of(&mended.bytes);
+    assert_eq!(
+        mended.report.holes.len(),
+        2,
+        "that of the sheet and the island's"
+    );
+    let kinds: Vec<LoopKind> = after.loops.iter().map(|l| l.kind).collect();
+    assert_eq!(
+        kinds,
+        [LoopKind::Outer],
+        "{:?}",
+        mended.report.holes[0].notes
+    );
+    assert_eq!(after.topology.components, 1);
+    assert!(off(&after) < 0.02, "{} off", off(&after));
+    let missing = std::f64::consts::PI * (0.32 * 0.32 - 0.2 * 0.2 + 0.07 * 0.07);
+    let area = after.patch_area() / missing;
+    assert!((0.9..1.15).contains(&area), "{area} of what is missing");
+}
+
+#[test]
+fn scraps_that_float_beside_the_cloth_are_told_of() {
+    let keep = |u: f64, v: f64| (u - 0.5).hypot(v - 0.5) > 0.18;
+    let cloth = sheet(36, keep, |u, v| Vec3::new(u, v, 0.0));
+    let scraps = (0..5).map(|k| {
+        let at = Vec3::new(0.2 * f64::from(k), 0.3, 0.4);
+        [at, at + Vec3::x() * 0.03, at + Vec3::y() * 0.03]
+    });
+    let mut littered = cloth.clone();
+    for corners in scraps {
+        let first = littered.positions.len() as u32;
+        littered.positions.extend(corners);
+        littered.faces.push([first, first + 1, first + 2]);

@@ -2,33 +2,26 @@
 
 use std::time::Instant;
 
-use darn_budget::{Budget, Exhausted, Steps};
-use rstar::{PointDistance as _, RTree};
+use darn_budget::Budget;
 
 use crate::confidence;
 use crate::doubts::doubts;
 use crate::error::MendError;
 use crate::fair_hole::FairHole;
 use crate::fill_hole::PatchDraft;
+use crate::loose_pieces;
 use crate::hole::Hole;
 use crate::prepared_hole::HoleRef;
 use crate::timings::milliseconds;
 use crate::welded_scan::{WeldedScan, kind};
 use darn_contract::v1;
-use darn_geometry::mesh::index::VertexId;
-use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind};
 use darn_geometry::patch::Patch;
 use darn_geometry::patch::quality::{self, Quality};
 
 /// A note is written when an edge of chart or patch is stretched more than this.
 const SUSPICIOUS: f64 = 1.5;
-/// A loose piece lies in the hole when all of its border is nearer to the patch than this many edges of the hole's rim.
-const IN_THE_HOLE: f64 = 1.5;
-
-/// Most loose pieces that a note names.
+/// Most islands that a note names.
 const MAX_NAMED: usize = 20;
-/// Nanoseconds of work a search for the nearest vertex of a patch.
-const NEAREST_WORK: u64 = 300;
 
 /// A hole's patch and its report.
 pub struct FilledHole<'a> {
@@ -74,7 +67,7 @@ impl<'a> PatchDraft<'a> {
             confidence = confidence::report(new, hole.extent());
         }
         let mut notes = notes(hole, &quality);
-        notes.extend(loose_pieces_note(hole, &patch, welded, budget)?);
+        notes.extend(loose_pieces::notes(hole, &patch, welded, budget)?);
         notes.extend(constraints.iter().flat_map(|c| c.notes(&kept.anchors)));
         let rim = &welded.loops[hole.id() as usize];
         let report = v1::HoleReport {
@@ -144,69 +137,8 @@ pub fn patch_report(hole: HoleRef, patch: &Patch, quality: &Quality) -> v1::Patc
     }
 }
 
-/// A note on loose pieces of the scan that lie where the patch is. The chart does not contain them, as they are not
-/// connected to the cloth around the hole.
-///
-/// # Errors
-/// `Exhausted`: every other piece is looked at for every hole.
-fn loose_pieces_note(
-    hole: HoleRef,
-    patch: &Patch,
-    welded: &WeldedScan,
-    budget: &Budget,
-) -> Result<Option<String>, Exhausted> {
-    let rim = &welded.loops[hole.id() as usize];
-    let islands = hole.charted().map_or(&[][..], |hole| &hole.islands);
-    let is_loose = |l: &&BoundaryLoop| {
-        l.kind == LoopKind::Outer
-            && l.component != rim.component
-            && !l.vertices.is_empty()
-            && !islands.contains(&l.id)
-    };
-    let others = welded.loops.iter().filter(is_loose);
-    let mut others = others.peekable();
-    if others.peek().is_none() {
-        return Ok(None);
-    }
-    let near = IN_THE_HOLE * rim.length / rim.vertices.len().max(1) as f64;
-    let tree = RTree::bulk_load(
-        patch
-            .positions
-            .iter()
-            .map(|p| <[f64; 3]>::from(*p))
-            .collect(),
-    );
-    let is_near = |v: &VertexId| {
-        let place = <[f64; 3]>::from(welded.surface.mesh.positions[v.index()]);
-        let nearest = tree.nearest_neighbor(&place);
-        nearest.is_some_and(|p| p.distance_2(&place) <= near * near)
-    };
-    let mut steps = Steps::of(budget);
-    let mut pieces: Vec<String> = Vec::new();
-    for piece in others {
-        let near = (piece.vertices.iter().take_while(|v| is_near(v))).count();
-        steps.take(NEAREST_WORK * (near as u64 + 1))?;
-        if near == piece.vertices.len() {
-            pieces.push(piece.id.to_string());
-        }
-    }
-    if pieces.is_empty() {
-        return Ok(None);
-    }
-    let more = pieces.len().saturating_sub(MAX_NAMED);
-    pieces.truncate(MAX_NAMED);
-    let more = match more {
-        0 => String::new(),
-        more => format!(" and {more} more"),
-    };
-    Ok(Some(format!(
-        "loose piece(s) of the scan lie in the hole (their borders: loop {}{more}); they were kept, and the new cloth covers their place, too",
-        pieces.join(", ")
-    )))
-}
-
 /// Which pieces of the scan were no part of the cloth at a hole's rim, and which lie loose and are.
-fn rim_notes(hole: &Hole) -> Vec<String> {
+fn rim_notes(hole: HoleRef) -> Vec<String> {
     let mut notes = Vec::new();
     if hole.left_faces > 0 {
         notes.push(format!(

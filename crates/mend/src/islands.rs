@@ -8,7 +8,7 @@ use crate::without_noise::Denoise;
 use darn_geometry::flatten::{self, FlattenError};
 use darn_geometry::mesh::Vec3;
 use darn_geometry::mesh::index::LoopId;
-use darn_geometry::mesh::island::disk;
+use darn_geometry::mesh::island::loose_piece;
 use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind};
 use darn_geometry::mesh::region::{BoundedMesh, Region};
 use darn_geometry::misfit::{FilledChart, place_island};
@@ -52,7 +52,7 @@ impl Islands<'_> {
         let filled: Vec<Vec3> = base.iter().map(|q| sampled.normal.to_scene(q)).collect();
         let mut joined = flat.clone();
         for border in loose.take(MAX_LOOKED_AT) {
-            if let Some(island) = disk(self.whole, border.id, budget)? {
+            if let Some(island) = loose_piece(self.whole, border.id, budget)? {
                 let hole = FilledChart {
                     region: joined.seen(),
                     chart: &joined.chart,

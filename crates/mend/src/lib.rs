@@ -43,6 +43,7 @@ mod laid_cloth;
 mod last_pulled;
 mod limits;
 mod mender;
+mod loose_pieces;
 mod moved_fill;
 mod near_seams;
 mod nearest_loop;

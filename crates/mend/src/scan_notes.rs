@@ -2,6 +2,7 @@
 
 use darn_contract::{excerpt, v1};
 use darn_geometry::mesh::index::VertexId;
+use darn_geometry::misfit::FEWEST_FACES;
 use darn_gltf_scan::{NamedPlace, Scan};
 
 use crate::welded_scan::WeldedScan;
@@ -24,6 +25,12 @@ pub fn notes(welded: &WeldedScan, scan: &Scan) -> Vec<String> {
         notes.push(format!(
             "boundary loops touch themselves or each other at {touching} point(s); where a hole touches the outer boundary \
              it is part of it and stays open"
+        ));
+    }
+    let scraps = scraps(welded);
+    if scraps > 0 {
+        notes.push(format!(
+            "{scraps} loose scrap(s) of fewer than {FEWEST_FACES} triangles lie apart from the cloth; they were left as they are"
         ));
     }
     let skins = welded.second_skins.iter().flatten().count();
@@ -110,6 +117,17 @@ fn listed(what: &str, places: &[NamedPlace]) -> String {
         String::new()
     };
     named.join(", ") + &rest
+}
+
+/// Number of components of few faces beside others of more.
+fn scraps(welded: &WeldedScan) -> usize {
+    let topology = &welded.topology;
+    let mut faces = vec![0usize; topology.components];
+    for component in topology.component.iter() {
+        faces[*component as usize] += 1;
+    }
+    let scraps = faces.iter().filter(|faces| **faces < FEWEST_FACES).count();
+    if scraps < faces.len() { scraps } else { 0 }
 }
 
 /// Number of points in which boundary loops touch (bow-ties).

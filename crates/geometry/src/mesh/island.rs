@@ -6,13 +6,16 @@ use darn_budget::{Budget, Exhausted};
 
 use super::TriMesh;
 use super::index::{FaceId, HalfEdgeId, LoopId, VertexId};
+use super::loops::BoundaryLoop;
 use super::region::{BoundedMesh, Region};
 
 /// Nanoseconds of work a face of a loose piece.
 const DISK_WORK: u64 = 200;
+/// Nanoseconds of work a loop of the scan.
+const LOOP_WORK: u64 = 5;
 
 impl Region {
-    /// The region with a piece of cloth that lies loose in its hole: a region of its own that is a disk.
+    /// The region with a piece of cloth that lies loose in its hole: a region of its own without a rim. Holes of the piece are others of the region.
     pub fn with_island(mut self, island: &Region) -> Region {
         let base = self.mesh.positions.len() as u32;
         self.mesh
@@ -22,18 +25,18 @@ impl Region {
         self.mesh.faces.extend(faces);
         self.vertices.extend_from_slice(&island.vertices);
         self.faces.extend_from_slice(&island.faces);
-        let border = island.outer.iter().map(|v| base + v);
-        self.islands.push(border.collect());
+        let shifted = |line: &Vec<u32>| -> Vec<u32> { line.iter().map(|v| base + v).collect() };
+        self.islands.push(shifted(&island.outer));
+        self.holes.extend(island.holes.iter().map(shifted));
         self
     }
 }
 
-/// The whole component that an outer boundary bounds, when it has no other boundary and is a disk: a region without a
-/// rim.
+/// The whole component that an outer boundary bounds, when it is a disk once its holes are closed: a region without a rim.
 ///
 /// # Errors
 /// `Exhausted`.
-pub fn disk(
+pub fn loose_piece(
     whole: &BoundedMesh,
     boundary: LoopId,
     budget: &Budget,
@@ -65,12 +68,24 @@ pub fn disk(
     let mut vertices: Vec<u32> = faces.iter().flat_map(|f| mesh.faces[f.index()]).collect();
     vertices.sort_unstable();
     vertices.dedup();
-    // χ of a disk is 1; inner edges have two half-edges.
-    let edges = (3 * faces.len() + border.half_edges.len()) / 2;
-    if vertices.len() + faces.len() != edges + 1 {
+    budget.spend(LOOP_WORK * loops.len() as u64)?;
+    let others = loops.iter();
+    let others = others.filter(|l| l.component == border.component && l.id != boundary);
+    let own: Vec<&BoundaryLoop> = others.filter(|l| !l.vertices.is_empty()).collect();
+    let mut on_boundary: Vec<VertexId> = (own.iter().chain([&border]))
+        .flat_map(|l| l.vertices.iter().copied())
+        .collect();
+    let ends = on_boundary.len();
+    on_boundary.sort_unstable();
+    on_boundary.dedup();
+    // χ of a disk is 1, less one for each hole; inner edges have two half-edges.
+    let edges = (3 * faces.len() + ends) / 2;
+    let is_disk = vertices.len() + faces.len() + own.len() == edges + 1;
+    if !is_disk || on_boundary.len() != ends || own.iter().any(|l| !l.is_surrounded()) {
         return Ok(None);
     }
     let local = |v: u32| vertices.partition_point(|w| *w < v) as u32;
+    let line = |l: &BoundaryLoop| -> Vec<u32> { l.vertices.iter().map(|v| local(v.0)).collect() };
     Ok(Some(Region {
         mesh: TriMesh {
             positions: vertices
@@ -84,9 +99,9 @@ pub fn disk(
         },
         faces,
         rim: Vec::new(),
-        holes: Vec::new(),
+        holes: own.iter().map(|l| line(l)).collect(),
         islands: Vec::new(),
-        outer: border.vertices.iter().map(|v| local(v.0)).collect(),
+        outer: line(border),
         reach: 0.0,
         wraps: false,
         vertices: vertices.into_iter().map(VertexId).collect(),

@@ -16,7 +16,7 @@ use crate::mesh::{Vec2, Vec3};
 use crate::patch::{Outline, across};
 
 /// Pieces of fewer faces are scraps: they say nothing of the cloth.
-const FEWEST_FACES: usize = 8;
+pub const FEWEST_FACES: usize = 8;
 /// Largest mean distance of an island from the fill ÷ its extent.
 const FAR: f64 = 0.2;
 /// Least mean cosine of the angle between the normals of an island and of the fill.
@@ -155,7 +155,7 @@ mod tests {
     use super::*;
     use crate::flatten::{FlattenLimits, flatten, raster};
     use crate::grid::CELLS;
-    use crate::mesh::island::disk;
+    use crate::mesh::island::loose_piece;
     use crate::mesh::loops::{LoopKind, boundary_loops};
     use crate::mesh::region::{BoundedMesh, grow};
     use crate::mesh::shapes::sheet;
@@ -192,7 +192,7 @@ mod tests {
             .iter()
             .find(|l| l.component != hole.component)
             .expect("an island");
-        let island = disk(&whole, loose.id, Budget::unlimited())
+        let island = loose_piece(&whole, loose.id, Budget::unlimited())
             .expect("no limits")
             .expect("a disk");
         let lay = |region| {

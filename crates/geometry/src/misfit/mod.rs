@@ -6,5 +6,5 @@ mod island;
 mod overlap;
 
 pub use flaps::flaps;
-pub use island::{FilledChart, place_island};
+pub use island::{FEWEST_FACES, FilledChart, place_island};
 pub use overlap::overlapping_lip;
