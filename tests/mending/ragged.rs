@@ -4,7 +4,9 @@
 use darn_contract::Constraints;
 use darn_contract::v1;
 use darn_geometry::mesh::loops::LoopKind;
-use darn_geometry::mesh::shapes::{fray, overlapping_slit, sheet, tongue};
+use darn_geometry::mesh::shapes::{
+    flap, fray, overlapping_slit, sheet, three_cornered_tear, tongue,
+};
 use darn_geometry::mesh::{TriMesh, Vec3};
 
 use super::cloth::{MendedScan, mended, packed, read};
@@ -91,6 +93,49 @@ fn cloth_is_laid_under_a_tongue() {
     }
 }
 
+fn waves(u: f64, v: f64) -> f64 {
+    0.03 * (6.0 * u).sin() * (3.0 * v).cos()
+}
+
+/// How far the new cloth is from the waves, at most.
+fn off(after: &MendedScan) -> f64 {
+    let new = after.new_positions();
+    let off = new.iter().map(|p| (p.z - waves(p.x, p.y)).abs());
+    off.fold(0.0, f64::max)
+}
+
+#[test]
+fn cloth_is_laid_under_a_flap_that_is_shorter_than_the_hole() {
+    for (shape, angle) in [
+        ([0.12, 0.1], 1.57),
+        ([0.2, 0.1], 1.2),
+        ([0.12, 0.14], 2.7),
+        ([0.16, 0.1], -1.57),
+    ] {
+        let (_, soup) = flap(60, shape, angle, waves);
+        let (report, after) = mend(&soup);
+        check(&report);
+        assert!(report.left_faces > 30, "{} faces", report.left_faces);
+        assert!(
+            off(&after) < 0.025,
+            "{} off, {shape:?} {angle}",
+            off(&after)
+        );
+    }
+}
+
+#[test]
+fn cloth_is_laid_under_the_corner_of_a_three_cornered_tear() {
+    for angle in [0.5, 0.9, 1.57, 2.6] {
+        let (report, after) = mend(&three_cornered_tear(60, 0.2, angle, waves));
+        check(&report);
+        assert!(report.left_faces > 60, "{} faces", report.left_faces);
+        assert!(off(&after) < 0.025, "{} off at {angle}", off(&after));
+        let area = after.patch_area() / (0.5 * 0.2 * 0.2);
+        assert!((0.8..1.6).contains(&area), "{area} of the corner's area");
+    }
+}
+
 #[test]
 fn lips_that_overlap_are_joined() {
     for edges in [0.6, 1.5] {
@@ -136,8 +181,6 @@ fn a_scrap_above_a_hole_is_left() {
         kinds.dedup();
         assert_eq!(kinds, [LoopKind::Outer]);
         assert_eq!(after.topology.components, 2);
-    }
-}
         let said = report
             .notes
             .iter()
@@ -188,3 +231,12 @@ fn scraps_that_float_beside_the_cloth_are_told_of() {
         let first = littered.positions.len() as u32;
         littered.positions.extend(corners);
         littered.faces.push([first, first + 1, first + 2]);
+    }
+    let notes = |mesh: &TriMesh| {
+        let mended = mended(&packed(mesh, &[]), &Constraints::default());
+        mended.expect("a hole that can be filled").report.notes
+    };
+    assert_eq!(notes(&cloth), Vec::<String>::new());
+    let said = notes(&littered);
+    assert!(said[0].starts_with("5 loose scrap(s)"), "{said:?}");
+}

@@ -14,15 +14,27 @@ use crate::timings::milliseconds;
 use crate::welded_scan::WeldedScan;
 use darn_contract::{FieldError, v1};
 use darn_geometry::mesh::denoise::denoise;
-use darn_geometry::mesh::index::LoopId;
+use darn_geometry::mesh::index::{FaceId, LoopId};
 use darn_geometry::mesh::layers::Layers;
-use darn_geometry::mesh::region::{self, Region};
+use darn_geometry::mesh::region::{self, BoundedMesh, Region};
+use darn_geometry::mesh::sound_hole::SoundHole;
 use darn_geometry::patch::{FairPatch, Fairness, PatchWork, Untangling};
+
+/// Why a hole has no chart, or none that helps.
+#[derive(Default)]
+pub struct NoChart {
+    /// Why, for a person.
+    pub reason: String,
+    /// Faces of the scan at the rim that were found to be no part of its cloth.
+    pub left: Vec<FaceId>,
+}
 
 /// A hole without a chart, and the fair surface that closes it.
 pub struct FairHole {
     /// The loop's id.
     pub id: u32,
+    /// Faces of the scan at the rim that are no part of its cloth: the surface starts at the sound edge beneath them.
+    pub left: Vec<FaceId>,
     /// The cloth next to its rim.
     pub region: Region,
     /// What closes it.
@@ -38,19 +50,30 @@ pub struct FairHole {
 }
 
 impl FairHole {
-    /// Closes the hole of a loop with a fair surface.
+    /// Closes the hole of a loop with a fair surface, from the edge of the cloth without the faces `left` where that is one line.
     ///
     /// # Errors
     /// `Region` or `Patch`, whichever stage fails; `Exhausted`.
     pub fn new(
         welded: &WeldedScan,
         id: u32,
-        reason: String,
+        reason: NoChart,
         untangling: Untangling,
         call: Call,
     ) -> Result<FairHole, MendError> {
         let (started, budget) = (Instant::now(), call.budget);
-        let whole = welded.bounded();
+        let NoChart { reason, left } = reason;
+        let scanned = welded.bounded();
+        let sound = SoundHole::without(&scanned, &welded.loops[id as usize], left, budget)?;
+        let whole = match &sound {
+            None => scanned,
+            Some(sound) => BoundedMesh {
+                topology: &sound.topology,
+                loops: &sound.loops,
+                ..scanned
+            },
+        };
+        let left = sound.as_ref().map_or(&[][..], |sound| &sound.left);
         let region =
             region::collar(&whole, LoopId(id), 0.0, budget).map_err(MendError::region(id))?;
         let region_ms = milliseconds(started);
@@ -75,7 +98,7 @@ impl FairHole {
             budget.spend(welded.blocks.search_work())?;
             // No point of the patch is farther from the rim than this.
             let margin = fair.patch.beyond_rim();
-            let layers = Layers::near(&whole, &welded.blocks, &region, margin, &[]);
+            let layers = Layers::near(&whole, &welded.blocks, &region, margin, left);
             Ok(fair.clear_of(&layers, margin, untangling, budget)?)
         };
         let fair = match closed(Fairness::Curved) {
@@ -97,6 +120,7 @@ impl FairHole {
         };
         let hole = FairHole {
             id,
+            left: left.to_vec(),
             denoised: smooth.is_some(),
             timings: v1::HoleTimings {
                 region: region_ms,
@@ -150,7 +174,7 @@ impl FairHole {
     pub fn bytes(&self) -> usize {
         24 * self.region.mesh.positions.len()
             + 16 * self.region.mesh.faces.len()
-            + 4 * self.region.vertices.len()
+            + 4 * (self.region.vertices.len() + self.left.len())
             + self.fair.bytes()
             + self.textures.bytes()
     }

@@ -16,7 +16,7 @@ use crate::timings::milliseconds;
 use darn_contract::v1;
 use darn_geometry::flatten::Chart;
 use darn_geometry::grid::{self, CELLS, Grid, NormalGrid, Normalisation};
-use darn_geometry::mesh::index::LoopId;
+use darn_geometry::mesh::index::{FaceId, LoopId};
 use darn_geometry::mesh::region::Region;
 use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
 use darn_geometry::patch::{LastStrain, Patch, PatchPlan, PatchWork, Pull};
@@ -36,7 +36,7 @@ pub struct Hole {
     /// The loop's id.
     pub id: u32,
     /// Faces of the scan at the rim that are no part of its cloth: the patch starts at the sound edge beneath them.
-    pub left_faces: usize,
+    pub left: Vec<FaceId>,
     /// The cloth around it.
     pub region: Region,
     /// The region laid flat.
@@ -309,7 +309,7 @@ impl Hole {
     pub fn bytes(&self) -> usize {
         let mesh = |m: &TriMesh| 24 * m.positions.len() + 12 * m.faces.len();
         let region = mesh(&self.region.mesh)
-            + 4 * (self.region.vertices.len() + self.region.faces.len())
+            + 4 * (self.region.vertices.len() + self.region.faces.len() + self.left.len())
             + 16 * self.chart.flat.len();
         // Position, known flag, entry in the hole's cells, base.
         let grid = CELLS * (24 + 1 + 9 + 12);

@@ -89,8 +89,8 @@ impl<'a> PatchDraft<'a> {
             notes,
             anchors: kept.anchors,
             edits: kept.edits,
-            doubts: doubts(&patch, hole.region()),
-            left_faces: hole.charted().map_or(0, |hole| hole.left_faces) as u32,
+            doubts,
+            left_faces: hole.left_faces() as u32,
             cut: welded.cuts.report(hole.id()),
         };
         Ok(FilledHole {
@@ -140,20 +140,21 @@ pub fn patch_report(hole: HoleRef, patch: &Patch, quality: &Quality) -> v1::Patc
 /// Which pieces of the scan were no part of the cloth at a hole's rim, and which lie loose and are.
 fn rim_notes(hole: HoleRef) -> Vec<String> {
     let mut notes = Vec::new();
-    if hole.left_faces > 0 {
+    let left = hole.left_faces();
+    if left > 0 {
         notes.push(format!(
-            "{} triangle(s) at the rim are no part of the cloth's edge (spikes, threads, flaps or a lip that lies over the other \
-             one); they were kept. The new cloth starts at the sound edge beneath them, and may pass through them",
-            hole.left_faces
+            "{left} triangle(s) at the rim are no part of the cloth's edge (spikes, threads, flaps or a lip that lies over the other \
+             one); they were kept. The new cloth starts at the sound edge beneath them, and may pass through them"
         ));
     }
-    if !hole.islands.is_empty() {
-        let borders: Vec<String> = (hole.islands.iter().take(MAX_NAMED))
+    let islands = hole.charted().map_or(&[][..], |hole| &hole.islands);
+    if !islands.is_empty() {
+        let borders: Vec<String> = (islands.iter().take(MAX_NAMED))
             .map(ToString::to_string)
             .collect();
         notes.push(format!(
             "{} loose piece(s) of the scan lie in the hole as part of its cloth (their borders: loop {}); the new cloth meets them",
-            hole.islands.len(),
+            islands.len(),
             borders.join(", ")
         ));
     }
@@ -173,9 +174,9 @@ fn notes(hole: HoleRef, quality: &Quality) -> Vec<String> {
             "the scan is noisy: the cloth around the hole was seen without that noise, its rim was kept"
                 .into(),
         );
+    notes.extend(rim_notes(hole));
     }
     if let Some(hole) = hole.charted() {
-        notes.extend(rim_notes(hole));
         notes.extend(hole.extent_note());
     }
     let most = hole.charted().map_or(1.0, |hole| hole.chart.stretch_max);

@@ -1,8 +1,8 @@
 //! Loose pieces of the scan that lie in a hole as part of its cloth: the patch meets them as it meets the rim.
 
 use crate::error::MendError;
+use crate::flat_region::FlatRegion;
 use crate::mender::Call;
-use crate::prepare::FlatRegion;
 use crate::sampled_grid::SampledGrid;
 use crate::without_noise::Denoise;
 use darn_geometry::flatten::{self, FlattenError};

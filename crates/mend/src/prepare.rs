@@ -4,35 +4,31 @@ use std::time::Instant;
 
 use crate::edit::{ReachLimit, RimPoint};
 use crate::error::MendError;
+use crate::flat_region::FlatRegion;
 use crate::hole::{Hole, UneditedCloths};
 use crate::islands::Islands;
 use crate::mender::Call;
+use crate::reach::{estimated_extent, reach_for};
 use crate::sampled_grid::SampledGrid;
 use crate::timings::milliseconds;
 use crate::welded_scan::WeldedScan;
 use crate::without_noise::{Denoise, without_noise};
-use darn_budget::{Budget, Exhausted};
 use darn_contract::v1;
-use darn_geometry::flatten::{self, Chart, FlattenError};
-use darn_geometry::mesh::Vec2;
+use darn_geometry::flatten;
 use darn_geometry::mesh::blocks::FaceBlocks;
 use darn_geometry::mesh::index::{FaceId, LoopId};
 use darn_geometry::mesh::layers::Layers;
 use darn_geometry::mesh::region::{self, BoundedMesh, Region, RegionError};
 use darn_geometry::mesh::sound_hole::SoundHole;
 use darn_geometry::mesh::spikes::spikes;
-use darn_geometry::misfit::{flaps, overlapping_lip};
+use darn_geometry::misfit::{flaps, lies_flat, overlapping_lip, standing_pieces, stands_out};
 use darn_geometry::patch::{FairLayout, FairPatch, Fairness, PatchError, PatchMesh, PatchWork};
 use darn_geometry::polygon::extent;
 
-/// Share of the grid's side that the hole should take, so that hole and context share the grid as in training.
-const HOLE_SHARE: f64 = 0.5;
 /// A region is grown again when its reach differs from the suitable one by more than this factor.
 const REACH_TOLERANCE: f64 = 1.3;
 /// Factor of the reach of each further try, when a region gives no usable chart.
 const SHRINK: f64 = 0.6;
-/// Reach of the collar that the extent of a hole is first measured on, as a share of the reach that suits a round hole.
-const COLLAR: f64 = 0.2;
 /// Largest mean stretch of a chart of cloth that was cut open: other surfaces that wrap around than tubes have more, and
 /// a smaller region serves them better.
 const TUBE_STRETCH: f64 = 1.05;
@@ -44,16 +40,46 @@ const MISFIT_SEARCHES: usize = 4;
 const WORTH_KEEPING: f64 = 1.15;
 /// How much the shapes of triangles count that keep the sides of a hole apart, beside those of the cloth.
 const KEEPS_APART: f64 = 0.02;
+/// Reach of the region in which pieces that stand out are looked for, as a multiple of that around the hole: the cloth beyond them shows where they
+/// should lie.
+const BEYOND_PIECES: f64 = 2.0;
+
+/// Why a hole has no chart.
+#[derive(Debug)]
+pub struct Unprepared {
+    /// Why.
+    pub error: MendError,
+    /// Faces of the scan at the rim that are no part of its cloth, as far as they were found.
+    pub left: Vec<FaceId>,
+}
+
+impl From<Unprepared> for MendError {
+    fn from(unprepared: Unprepared) -> MendError {
+        unprepared.error
+    }
+}
+
 /// Prepares the hole of a loop, from the sound edge of its cloth: pieces at the rim that do not belong to it are left
 /// out. Where that gives no hole, from the rim as it was scanned.
 ///
 /// # Errors
 /// `Region`, `Flatten`, `TooLittleKnown` or `Patch`, whichever stage fails; of several tries the last one's, of the
 /// denoised cloth. `Exhausted`.
-pub fn prepare_hole(welded: &WeldedScan, id: u32, call: Call) -> Result<Hole, MendError> {
+pub fn prepare_hole(welded: &WeldedScan, id: u32, call: Call) -> Result<Hole, Unprepared> {
+    let mut left = Vec::new();
+    prepared(welded, id, &mut left, call).map_err(|error| Unprepared { error, left })
+}
+
+/// The same; `left` gets the faces that are no part of the cloth.
+fn prepared(
+    welded: &WeldedScan,
+    id: u32,
+    left: &mut Vec<FaceId>,
+    call: Call,
+) -> Result<Hole, MendError> {
     let scanned = welded.bounded();
     let rim = &welded.loops[id as usize];
-    let mut left = spikes(scanned.mesh, scanned.topology, rim, call.budget)?;
+    *left = spikes(scanned.mesh, scanned.topology, rim, call.budget)?;
     let mut outcome = None;
     for searches_left in (0..MISFIT_SEARCHES).rev() {
         let sound = SoundHole::without(&scanned, rim, left.clone(), call.budget)?;
@@ -165,20 +191,6 @@ struct Preparation<'a> {
     call: Call<'a>,
 }
 
-/// The cloth around a hole, laid flat.
-#[derive(Clone)]
-pub struct FlatRegion {
-    /// The region.
-    pub region: Region,
-    /// The region without the scanner's noise, where there is some.
-    pub smooth: Option<Region>,
-    /// The region's layout in the plane.
-    pub chart: Chart,
-    /// The borders of the islands in it, as loops of the scan.
-    pub islands: Vec<LoopId>,
-    timings: v1::HoleTimings,
-}
-
 /// The triangles of a patch, and the time that they took.
 struct TimedMesh {
     mesh: PatchMesh,
@@ -192,8 +204,7 @@ impl Preparation<'_> {
         let mut tries = 0;
         loop {
             let outcome = self.flat_region(reach).and_then(|flat| {
-                let misfit = self.misfit(|| flaps(flat.seen(), &flat.chart, self.call.budget))?;
-                match misfit {
+                match self.misfit(|| self.flaps(&flat))? {
                     Some(faces) => Ok(Prepared::Misfit(faces)),
                     None => Ok(Prepared::Hole(Box::new(self.sampled(flat)?))),
                 }
@@ -203,7 +214,7 @@ impl Preparation<'_> {
                 Err(error) if tries < MAX_TRIES && may_shrink(&error) => reach *= SHRINK,
                 Err(error) if rim_crosses(&error) => {
                     let flat = self.flat_region(widest)?;
-                    let lip = || overlapping_lip(flat.seen(), &flat.chart, self.call.budget);
+                    let lip = || Ok(overlapping_lip(flat.seen(), &flat.chart, self.call.budget)?);
                     return match self.misfit(lip)? {
                         Some(lip) => Ok(Prepared::Misfit(lip)),
                         None => self.kept_apart(flat, error),
@@ -250,11 +261,26 @@ impl Preparation<'_> {
         }
     }
 
+    /// The faces of flaps at the rim, or of other pieces that stand out.
+    fn flaps(&self, flat: &FlatRegion) -> Result<Vec<FaceId>, MendError> {
+        let budget = self.call.budget;
+        let found = flaps(flat.seen(), &flat.chart, budget)?;
+        if !found.is_empty() || !stands_out(flat.seen(), &flat.chart, budget)? {
+            return Ok(found);
+        }
+        let wide = match self.flattened(BEYOND_PIECES * flat.region.reach) {
+            Err(MendError::Exhausted(exhausted)) => return Err(exhausted.into()),
+            wide => wide.ok().filter(|wide| lies_flat(&wide.chart)),
+        };
+        let seen = wide.as_ref().unwrap_or(flat);
+        Ok(standing_pieces(seen.seen(), &seen.chart, budget)?)
+    }
+
     /// The faces that a search finds; `None` when it finds none, or no search is left.
     fn misfit(
         &self,
-        search: impl Fn() -> Result<Vec<FaceId>, Exhausted>,
-    ) -> Result<Option<Vec<FaceId>>, Exhausted> {
+        search: impl Fn() -> Result<Vec<FaceId>, MendError>,
+    ) -> Result<Option<Vec<FaceId>>, MendError> {
         if self.cloth.searches_left == 0 {
             return Ok(None);
         }
@@ -416,7 +442,7 @@ impl Preparation<'_> {
         let reach = ReachLimit::new(rim);
         Ok(Hole {
             id,
-            left_faces: self.cloth.left.len(),
+            left: self.cloth.left.to_vec(),
             plan,
             report: sampled.report(&rim_uv),
             grid: sampled.grid,
@@ -435,43 +461,6 @@ impl Preparation<'_> {
             region,
             chart,
         })
-    }
-}
-
-impl FlatRegion {
-    /// The region as the chart shows it: without the scanner's noise.
-    pub fn seen(&self) -> &Region {
-        self.smooth.as_ref().unwrap_or(&self.region)
-    }
-
-    /// The rim on the chart's unit square.
-    pub fn rim_uv(&self) -> Vec<Vec2> {
-        let rim = self.region.rim.iter();
-        rim.map(|v| self.chart.uv(*v)).collect()
-    }
-}
-
-/// Reach of the region around a hole of this extent; both in scene units.
-fn reach_for(extent: f64) -> f64 {
-    0.5 * extent * (1.0 / HOLE_SHARE - 1.0)
-}
-
-/// Larger side of the hole's box in a chart of a narrow collar around it; where the collar cannot be laid flat, that of
-/// a round hole.
-///
-/// # Errors
-/// `Exhausted`.
-fn estimated_extent(whole: &BoundedMesh, id: u32, budget: &Budget) -> Result<f64, Exhausted> {
-    let round = whole.loops[id as usize].length / std::f64::consts::PI;
-    let collar = match region::grow(whole, LoopId(id), COLLAR * reach_for(round), budget) {
-        Ok(collar) => collar,
-        Err(RegionError::Exhausted(exhausted)) => return Err(exhausted),
-        Err(_) => return Ok(round),
-    };
-    match flatten::hole_extent(&collar, budget) {
-        Ok(extent) => Ok(extent),
-        Err(FlattenError::Exhausted(exhausted)) => Err(exhausted),
-        Err(_) => Ok(round),
     }
 }
 

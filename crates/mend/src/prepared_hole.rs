@@ -4,11 +4,11 @@ use darn_budget::{Budget, Exhausted};
 
 use crate::doubts::doubts;
 use crate::error::MendError;
-use crate::fair_hole::FairHole;
+use crate::fair_hole::{FairHole, NoChart};
 use crate::hole::Hole;
 use crate::inpainter::Inpainter;
 use crate::mender::Call;
-use crate::prepare::prepare_hole;
+use crate::prepare::{Unprepared, prepare_hole};
 use crate::texture::HoleTextures;
 use crate::welded_scan::WeldedScan;
 use darn_geometry::mesh::TriMesh;
@@ -42,16 +42,18 @@ impl PreparedHole {
         let fair = |reason| FairHole::new(welded, id, reason, Untangling::Always, call);
         let boxed = |hole| PreparedHole::Fair(Box::new(hole));
         if !welded.loops[id as usize].is_surrounded() {
-            return fair("it is no hole in a sheet but an end of the cloth".to_owned()).map(boxed);
+            let reason = "it is no hole in a sheet but an end of the cloth".to_owned();
+            let left = Vec::new();
+            return fair(NoChart { reason, left }).map(boxed);
         }
-        let error = match prepare_hole(welded, id, call) {
+        let Unprepared { error, left } = match prepare_hole(welded, id, call) {
             Ok(hole) => return Ok(PreparedHole::Charted(Box::new(hole))),
-            Err(error) => error,
+            Err(unprepared) => unprepared,
         };
         let Some(reason) = why_no_chart(&error) else {
             return Err(error);
         };
-        match fair(reason) {
+        match fair(NoChart { reason, left }) {
             Ok(hole) => Ok(boxed(hole)),
             Err(MendError::Exhausted(exhausted)) => Err(exhausted.into()),
             Err(_) => Err(error),
@@ -143,6 +145,14 @@ impl<'a> HoleRef<'a> {
     pub fn denoised(self) -> bool {
         match self {
             HoleRef::Charted(hole) => hole.denoised,
+    /// How many faces of the scan at the rim are no part of its cloth.
+    pub fn left_faces(self) -> usize {
+        match self {
+            HoleRef::Charted(hole) => hole.left.len(),
+            HoleRef::Fair(hole) => hole.left.len(),
+        }
+    }
+
             HoleRef::Fair(hole) => hole.denoised,
         }
     }

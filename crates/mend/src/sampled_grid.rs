@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use crate::edit::HoleCells;
 use crate::error::MendError;
-use crate::prepare::FlatRegion;
+use crate::flat_region::FlatRegion;
 use crate::timings::milliseconds;
 use darn_budget::Budget;
 use darn_contract::v1;

@@ -91,6 +91,92 @@ pub fn tongue_hinge(n: usize) -> f64 {
     (n / 3) as f64 / n as f64
 }
 
+/// A sheet, `n` squares a side, with a round hole of radius a fifth in its middle, into which a flap reaches: a strip of this `width` and `length`
+/// that was torn from what is gone but for a hinge at the hole's edge, and turned up by `angle` (radians) there.
+///
+/// Where its hinge lies, u, and the sheet. `lift` is how high the sheet lies at a place.
+pub fn flap(
+    n: usize,
+    [width, length]: [f64; 2],
+    angle: f64,
+    lift: impl Fn(f64, f64) -> f64,
+) -> (f64, TriMesh) {
+    let within = |u: f64, v: f64| (u - 0.5).hypot(v - 0.5) < 0.2;
+    let hinge = 0.5 + (0.04 - 0.25 * width * width).sqrt() - 1.5 / n as f64;
+    let strip = move |u: f64, v: f64| (v - 0.5).abs() < 0.5 * width && u > hinge - length;
+    let place = |u: f64, v: f64| {
+        let along = hinge - u;
+        if within(u, v)
+            && along > 0.0
+            && (v - 0.5).abs() < 0.5 * width + 1.0 / n as f64
+            && u > 0.5 - 0.15
+        {
+            return Vec3::new(
+                hinge - along * angle.cos(),
+                v,
+                lift(hinge, v) + along * angle.sin(),
+            );
+        }
+        Vec3::new(u, v, lift(u, v))
+    };
+    (hinge, sheet(n, |u, v| !within(u, v) || strip(u, v), place))
+}
+
+/// A sheet, `n` squares a side, with a three-cornered tear in its middle: two slits of `leg` that meet at a right angle, and the corner between them,
+/// which is turned up by `angle` (radians) about the line through their ends. `lift` is how high the sheet lies at a place.
+pub fn three_cornered_tear(
+    n: usize,
+    leg: f64,
+    angle: f64,
+    lift: impl Fn(f64, f64) -> f64,
+) -> TriMesh {
+    let (middle, long) = (n / 2, (leg * n as f64).round() as usize);
+    let mut mesh = sheet(n, |_, _| true, |u, v| Vec3::new(u, v, 0.0));
+    let place = |v: u32| (v as usize % (n + 1), v as usize / (n + 1));
+    let corner = middle as f64 / n as f64;
+    let beyond = |p: &Vec3| 2.0 * corner + long as f64 / n as f64 - p.x - p.y;
+    let on_slits = |v: u32| {
+        let (i, j) = place(v);
+        let along = |k: usize| (middle..middle + long).contains(&k);
+        (i == middle && along(j)) || (j == middle && along(i))
+    };
+    let whole = mesh.positions.len();
+    let mut torn: HashMap<u32, u32> = HashMap::new();
+    for face in &mut mesh.faces {
+        let inside = face.iter().all(|v| {
+            let (i, j) = place(*v);
+            i >= middle && j >= middle
+        });
+        for v in face.iter_mut().filter(|_| inside) {
+            if on_slits(*v) {
+                let next = (whole + torn.len()) as u32;
+                *v = *torn.entry(*v).or_insert(next);
+            }
+        }
+    }
+    let mut copies: Vec<(u32, u32)> = torn.into_iter().map(|(from, to)| (to, from)).collect();
+    copies.sort_unstable();
+    let copied = copies
+        .iter()
+        .map(|(_, from)| mesh.positions[*from as usize]);
+    let copied: Vec<Vec3> = copied.collect();
+    mesh.positions.extend(copied);
+    for (v, p) in mesh.positions.iter_mut().enumerate() {
+        let inside = v >= whole || (v % (n + 1) > middle && v / (n + 1) > middle);
+        let far = beyond(p) / 2f64.sqrt();
+        if inside && far > 1e-9 {
+            // The corner lies towards −u and −v of the hinge.
+            let towards = Vec3::new(-0.5f64.sqrt(), -0.5f64.sqrt(), 0.0);
+            let hinge = *p - towards * far;
+            *p = hinge + towards * (far * angle.cos());
+            p.z = lift(hinge.x, hinge.y) + far * angle.sin();
+        } else {
+            p.z = lift(p.x, p.y);
+        }
+    }
+    mesh
+}
+
 /// A flat sheet, `n` squares a side, with a slit along the middle two fifths of the line v = ½ whose upper lip is drawn
 /// over the lower one by up to `overlap`, and lies above it by a fifth of that.
 pub fn overlapping_slit(n: usize, overlap: f64) -> TriMesh {

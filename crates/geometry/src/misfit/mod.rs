@@ -4,7 +4,10 @@
 mod flaps;
 mod island;
 mod overlap;
+mod smooth_sheet;
+mod standing;
 
 pub use flaps::flaps;
 pub use island::{FEWEST_FACES, FilledChart, place_island};
 pub use overlap::overlapping_lip;
+pub use standing::{lies_flat, standing_pieces, stands_out};
