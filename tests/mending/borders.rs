@@ -268,3 +268,31 @@ fn a_tear_that_cannot_be_joined_is_refused_at_its_place() {
         assert!(error.to_string().contains(told), "{error}");
     }
 }
+
+#[test]
+fn a_new_hem_that_leaves_the_scan_is_no_plausible_cloth() {
+    let corner = torn(|u, v| u + v > 0.3, 0.02);
+    let at = |u: f64, v: f64| [u, v, 0.02 * (9.0 * u).sin()];
+    let asked = |along: Vec<[f64; 3]>| {
+        asking(Border::Line {
+            from: at(0.0, 0.3),
+            to: at(0.3, 0.0),
+            along,
+        })
+    };
+    let bytes = packed(&corner, &[]);
+    let sound = mended(&bytes, &asked(vec![at(0.0, 0.0)])).unwrap();
+    assert_eq!(sound.report.holes[0].doubts, Vec::<String>::new());
+    let far = asked(vec![[-5.0, -5.0, 3.0]]);
+    let refused = mended(&bytes, &far).unwrap_err();
+    assert_eq!(refused.code().word, "no_plausible_fill");
+    let accepted = Constraints {
+        accept_doubtful: true,
+        ..far
+    };
+    let doubts = &mended(&bytes, &accepted).unwrap().report.holes[0].doubts;
+    assert!(
+        doubts.iter().any(|d| d.contains("the whole scan")),
+        "{doubts:?}"
+    );
+}

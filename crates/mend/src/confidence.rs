@@ -9,6 +9,7 @@ use darn_geometry::grid::{self, NormalGrid, distances_to};
 use darn_geometry::patch::Patch;
 use darn_net::{ErrorModel, WITHIN_90};
 
+use crate::fill_hole::PatchDraft;
 use crate::hole::{Hole, UneditedCloth};
 
 /// Standard deviation of a smooth fill for each cell of depth, as a share of the plate's error about the cloth around the hole. Measured on 95 of 800
@@ -55,6 +56,16 @@ pub fn smooth_deviations(known: &[bool], plate_error: f64) -> Vec<f64> {
     depths
         .map(|depth| SMOOTH_PER_CELL * f64::from(depth) * plate_error)
         .collect()
+}
+
+impl PatchDraft<'_> {
+    /// The standard deviation of every vertex of the patch, scene units; empty where it is not known.
+    pub fn deviations(&self) -> Vec<f32> {
+        let known = self.hole.charted().zip(self.unedited.as_ref());
+        known.map_or_else(Vec::new, |(hole, unedited)| {
+            hole.vertex_deviations(unedited, &self.patch)
+        })
+    }
 }
 
 impl Hole {

@@ -5,12 +5,11 @@ use std::time::Instant;
 use darn_budget::Budget;
 
 use crate::confidence;
-use crate::doubts::doubts;
 use crate::error::MendError;
 use crate::fair_hole::FairHole;
 use crate::fill_hole::PatchDraft;
-use crate::loose_pieces;
 use crate::hole::Hole;
+use crate::loose_pieces;
 use crate::prepared_hole::HoleRef;
 use crate::timings::milliseconds;
 use crate::welded_scan::{WeldedScan, kind};
@@ -45,6 +44,7 @@ impl<'a> PatchDraft<'a> {
         welded: &WeldedScan,
         budget: &Budget,
     ) -> Result<FilledHole<'a>, MendError> {
+        let deviations = self.deviations();
         let PatchDraft {
             hole,
             patch,
@@ -59,13 +59,12 @@ impl<'a> PatchDraft<'a> {
         let started = Instant::now();
         let quality = quality::measure(&patch, hole.region());
         timings.report = milliseconds(started);
-        let (mut deviations, mut confidence) = (Vec::new(), None);
         let alternative = unedited.as_ref().map_or(0, |unedited| unedited.alternative);
-        if let Some((hole, unedited)) = hole.charted().zip(unedited) {
-            deviations = hole.vertex_deviations(&unedited, &patch);
-            let new = deviations.get(patch.rim.len()..).unwrap_or_default();
-            confidence = confidence::report(new, hole.extent());
-        }
+        let new = deviations.get(patch.rim.len()..).unwrap_or_default();
+        let extent = hole.charted().map(Hole::extent);
+        let confidence = extent.and_then(|extent| confidence::report(new, extent));
+        let mut doubts = hole.doubts(&patch);
+        doubts.extend(hole.mistrust(&patch, new, welded));
         let mut notes = notes(hole, &quality);
         notes.extend(loose_pieces::notes(hole, &patch, welded, budget)?);
         notes.extend(constraints.iter().flat_map(|c| c.notes(&kept.anchors)));
@@ -174,8 +173,8 @@ fn notes(hole: HoleRef, quality: &Quality) -> Vec<String> {
             "the scan is noisy: the cloth around the hole was seen without that noise, its rim was kept"
                 .into(),
         );
-    notes.extend(rim_notes(hole));
     }
+    notes.extend(rim_notes(hole));
     if let Some(hole) = hole.charted() {
         notes.extend(hole.extent_note());
     }

@@ -85,10 +85,14 @@ impl PreparedHole {
             "laid in its chart, its patch is no plausible cloth: {}",
             found.join("; ")
         );
+        let no_chart = NoChart {
+            reason,
+            left: hole.left.clone(),
+        };
         // A fair surface that is a tangle is dropped: there is no need to push it apart.
-        let fair = FairHole::new(welded, hole.id, reason, Untangling::UnlessTangled, call);
+        let fair = FairHole::new(welded, hole.id, no_chart, Untangling::UnlessTangled, call);
         let why_not = match fair {
-            Ok(fair) => match doubts(&fair.fair.patch, &fair.region) {
+            Ok(fair) => match HoleRef::Fair(&fair).doubts(&fair.fair.patch) {
                 none if none.is_empty() => return Ok(PreparedHole::Fair(Box::new(fair))),
                 some => some.join("; "),
             },
@@ -141,10 +145,6 @@ impl<'a> HoleRef<'a> {
         }
     }
 
-    /// Whether the cloth around it was seen without the scanner's noise.
-    pub fn denoised(self) -> bool {
-        match self {
-            HoleRef::Charted(hole) => hole.denoised,
     /// How many faces of the scan at the rim are no part of its cloth.
     pub fn left_faces(self) -> usize {
         match self {
@@ -153,6 +153,10 @@ impl<'a> HoleRef<'a> {
         }
     }
 
+    /// Whether the cloth around it was seen without the scanner's noise.
+    pub fn denoised(self) -> bool {
+        match self {
+            HoleRef::Charted(hole) => hole.denoised,
             HoleRef::Fair(hole) => hole.denoised,
         }
     }

@@ -312,7 +312,7 @@ impl ScanHoles {
             }
             let draft = self.draft(request, filler, call)?;
             stage.one_done();
-            match draft.reasons_to_leave() {
+            match draft.reasons_to_leave(&self.welded) {
                 doubts if doubts.is_empty() || selection.accept_doubtful => Ok(draft),
                 doubts => Err(draft.left(doubts)),
             }

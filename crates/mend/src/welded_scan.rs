@@ -8,6 +8,7 @@ use crate::cut::CutLoops;
 use crate::timings::milliseconds;
 use darn_contract::{excerpt, v1};
 use darn_geometry::mesh::blocks::FaceBlocks;
+use darn_geometry::mesh::curvature::face_areas;
 use darn_geometry::mesh::index::FaceId;
 use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind, boundary_loops};
 use darn_geometry::mesh::openings::Evidence;
@@ -15,7 +16,7 @@ use darn_geometry::mesh::region::BoundedMesh;
 use darn_geometry::mesh::skins::{SecondSkin, on_patches, second_skins};
 use darn_geometry::mesh::topology::Topology;
 use darn_geometry::mesh::weld::{WeldedMesh, weld_within};
-use darn_geometry::mesh::{TriMesh, Vec3};
+use darn_geometry::mesh::{TriMesh, Vec3, diagonal};
 use darn_gltf_scan::Scan;
 
 /// The welded surface of a scan and its loops.
@@ -30,6 +31,8 @@ pub struct WeldedScan {
     pub loops: Vec<BoundaryLoop>,
     /// Per loop whether it is a hole of a second skin, which is not filled again.
     pub second_skins: Vec<Option<SecondSkin>>,
+    /// Diagonal of the box of the scan's own surface, scene units.
+    pub across: f64,
     /// What the request's cuts did.
     pub cuts: CutLoops,
     /// Milliseconds of welding and of finding the loops.
@@ -87,6 +90,7 @@ impl WeldedScan {
             topology,
             loops: Vec::new(),
             second_skins: Vec::new(),
+            across: diagonal(&scan.surface.positions),
             cuts: CutLoops::default(),
             timings: v1::ScanTimings::default(),
         };
@@ -155,6 +159,18 @@ impl WeldedScan {
             topology: &self.topology,
             loops: &self.loops,
         }
+    }
+
+    /// Area of the component that a loop bounds, scene units squared.
+    pub fn piece_area(&self, rim: u32) -> f64 {
+        let Some(rim) = self.loops.get(rim as usize) else {
+            return 0.0;
+        };
+        let areas = face_areas(&self.surface.mesh);
+        let own = areas.iter().zip(self.topology.component.iter());
+        own.filter(|(_, component)| **component == rim.component)
+            .map(|(area, _)| area)
+            .sum()
     }
 
     /// The place of a loop's vertex, counted on around the loop, scene space.

@@ -57,6 +57,11 @@ impl Bounds {
     }
 }
 
+/// Diagonal of the box of some points; 0 without points.
+pub fn diagonal(points: &[Vec3]) -> f64 {
+    Bounds::of(points).map_or(0.0, |b| (b.high - b.low).norm())
+}
+
 /// A face and its box.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BoundedFace {

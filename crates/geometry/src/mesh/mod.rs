@@ -40,6 +40,8 @@ pub mod weld;
 #[cfg(test)]
 mod weld_tests;
 
+pub use bounds::diagonal;
+
 use std::collections::HashMap;
 
 /// A point or direction in the plane of a chart.

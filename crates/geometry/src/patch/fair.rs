@@ -50,6 +50,8 @@ pub enum Fairness {
 pub struct FairPatch {
     /// The patch; without a chart its `flat` is empty.
     pub patch: Patch,
+    /// Area of the triangles between the rim's vertices that bend least, scene units squared: how much cloth the rim asks for.
+    pub span_area: f64,
     /// From the rim to all vertices.
     rim_extension: HarmonicExtension,
     collisions: CollisionMesh,
@@ -72,6 +74,7 @@ impl FairPatch {
         } = work.into();
         let rim: Vec<u32> = region.rim.iter().rev().copied().collect();
         let mut sheet = spanned(&rim, region, budget)?;
+        let span_area = sheet.area();
         let edge = median_edge(&region.mesh);
         let fairing = Fairing::new(region, &rim, fairness, budget);
         let bend = settle(&mut sheet, &fairing, edge, budget)?;
@@ -100,6 +103,7 @@ impl FairPatch {
                 collisions: 0,
                 crossings: 0,
             },
+            span_area,
             rim_extension,
             collisions,
         })

@@ -61,17 +61,22 @@ pub fn stretch(patch: &Patch) -> PatchStretch {
     }
 }
 
-/// Measures a patch against its chart, if it has one, and the region it closes.
-pub fn measure(patch: &Patch, region: &Region) -> Quality {
+/// Area of a patch, scene units squared.
+pub fn area(patch: &Patch) -> f64 {
     let area = |face: &[u32; 3]| {
         let [a, b, c] = face.map(|v| patch.positions[v as usize]);
         0.5 * (b - a).cross(&(c - a)).norm()
     };
+    patch.faces.iter().map(area).sum()
+}
+
+/// Measures a patch against its chart, if it has one, and the region it closes.
+pub fn measure(patch: &Patch, region: &Region) -> Quality {
     let stretch = stretch(patch);
     let gap =
         |(k, v): (usize, &u32)| (patch.positions[k] - region.mesh.positions[*v as usize]).norm();
     Quality {
-        area: patch.faces.iter().map(area).sum(),
+        area: area(patch),
         stretch_mean: stretch.mean,
         stretch_max: stretch.max,
         gaussian_curvature: gaussian_curvature(patch),
