@@ -1,7 +1,7 @@
 //! What a report says about a scan as a whole: notes for a person, and what was set aside, by kind.
 
 use darn_contract::{excerpt, v1};
-use darn_geometry::mesh::index::VertexId;
+use darn_geometry::mesh::index::{FaceId, VertexId};
 use darn_geometry::misfit::FEWEST_FACES;
 use darn_gltf_scan::{NamedPlace, Scan};
 
@@ -123,8 +123,8 @@ fn listed(what: &str, places: &[NamedPlace]) -> String {
 fn scraps(welded: &WeldedScan) -> usize {
     let topology = &welded.topology;
     let mut faces = vec![0usize; topology.components];
-    for component in topology.component.iter() {
-        faces[*component as usize] += 1;
+    for face in (0..welded.surface.mesh.faces.len() as u32).map(FaceId) {
+        faces[topology.component(face) as usize] += 1;
     }
     let scraps = faces.iter().filter(|faces| **faces < FEWEST_FACES).count();
     if scraps < faces.len() { scraps } else { 0 }

@@ -167,9 +167,9 @@ impl WeldedScan {
             return 0.0;
         };
         let areas = face_areas(&self.surface.mesh);
-        let own = areas.iter().zip(self.topology.component.iter());
-        own.filter(|(_, component)| **component == rim.component)
-            .map(|(area, _)| area)
+        let own = (0u32..).map(FaceId).zip(&areas);
+        own.filter(|(face, _)| self.topology.component(*face) == rim.component)
+            .map(|(_, area)| area)
             .sum()
     }
 

@@ -282,6 +282,8 @@ impl<'a> Peeling<'a> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use proptest::prelude::*;
 
     use super::*;
@@ -291,7 +293,7 @@ mod tests {
     use crate::mesh::shapes::{flap, jitter, sheet, three_cornered_tear, tongue};
     use crate::mesh::weld::weld;
 
-    fn charted(soup: &TriMesh, reach: f64) -> (TriMesh, Region, Chart) {
+    fn charted(soup: &TriMesh, reach: f64) -> (Arc<TriMesh>, Region, Chart) {
         let mesh = weld(soup).mesh;
         let region = region_around_hole(&mesh, reach);
         let chart = flatten(&region, &FlattenLimits::default(), Budget::unlimited());

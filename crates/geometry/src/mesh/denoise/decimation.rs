@@ -2,6 +2,7 @@
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::{BTreeSet, BinaryHeap};
+use std::sync::Arc;
 
 use darn_budget::Budget;
 use nalgebra::{Matrix4, Vector4};
@@ -225,7 +226,7 @@ fn folded_sheet(n: usize, folds: f64, depth: f64, seed: u64) -> TriMesh {
 /// A robe of a statue: a closed wall with chiselled folds around it.
 fn robe(n: usize, folds: f64, depth: f64) -> TriMesh {
     let chisel = |x: f64| 4.0 * (x.rem_euclid(1.0) - 0.5).abs() - 1.0;
-    weld(&sheet(
+    let open = sheet(
         n,
         |_, _| true,
         |u, v| {
@@ -239,8 +240,8 @@ fn robe(n: usize, folds: f64, depth: f64) -> TriMesh {
             let radius = 0.4 + 0.15 * v + depth * fold * (0.3 + v);
             Vec3::new(radius * angle.cos(), radius * angle.sin(), 1.5 * v)
         },
-    ))
-    .mesh
+    );
+    Arc::unwrap_or_clone(weld(&open).mesh)
 }
 
 /// Mean edge, scene units.
