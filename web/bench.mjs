@@ -15,7 +15,7 @@ const LARGE = { side: 1000, frames: 10 };
 const load = loadavg()[0];
 const [browser, service] = await Promise.all([startBrowser(), startService()]);
 try {
-  const rows = [...(await firstLoad()), ...(await dragging()), ...(await largeScan())];
+  const rows = [...(await firstLoad()), ...(await dragging()), ...(await frameCosts()), ...(await largeScan())];
   console.log(
     `${cpus()[0].model}, ${cpus().length} processors, load ${load.toFixed(2)} before, ${new Date().toISOString()}\n`,
   );
@@ -72,7 +72,7 @@ async function dragging() {
     await page.mouse.move(...place((began - start) / (1000 * DRAG.seconds)));
     await page.waitForTimeout(Math.max(0, DRAG.pause - (performance.now() - began)));
   }
-  const { pictures, requests, seconds } = await page.evaluate(() => globalThis.darnWatch.end());
+  const { pictures, frames, requests, seconds } = await page.evaluate(() => globalThis.darnWatch.end());
   await page.mouse.up();
   await editor.idle();
   await editor.close();
@@ -82,7 +82,43 @@ async function dragging() {
     ['an answer at the server (`Server-Timing`)', server.length === 0 ? 'not told' : spread(server)],
     ["an answer's way there and back", spread(requests.map(({ whole }) => whole))],
     ['from a move of the pointer to the picture of its cloth', spread(pictures)],
+    ['frames a second while dragging', (frames.length / seconds).toFixed(0)],
+    ["pixels of a frame's side, of those of the window", `${Math.min(...frames)} to ${Math.max(...frames)}`],
   ];
+}
+
+/** What a frame of the example costs: everything, and new cloth over what is drawn once. */
+async function frameCosts() {
+  const editor = await openEditor(browser, service);
+  await editor.openExample();
+  await editor.mend();
+  const costs = await editor.page.evaluate(async () => {
+    const { screen } = document.querySelector('darn-editor').shadowRoot.querySelector('darn-stage').viewer;
+    const gl = screen.renderer.getContext();
+    const pixel = new Uint8Array(4);
+    const ways = {
+      everything: () => screen.drawNow(),
+      'new cloth alone': () => screen.stays.draw(screen.renderer, screen.camera),
+    };
+    const all = [];
+    for (const [name, draw] of Object.entries(ways)) {
+      for (const share of [1, 0.7, 0.5, 0.35]) {
+        screen.setShare(share);
+        const times = [];
+        for (let frame = 0; frame < 15; frame += 1) {
+          await new Promise((done) => requestAnimationFrame(done));
+          const start = performance.now();
+          draw();
+          gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+          times.push(performance.now() - start);
+        }
+        all.push([name, share, times]);
+      }
+    }
+    return all;
+  });
+  await editor.close();
+  return costs.map(([name, share, times]) => [`a frame of ${name}, ${share} of a side's pixels`, spread(times)]);
 }
 
 /** Runs in the page: notes when a pointer moved, and when the cloth of that move was drawn. */
@@ -93,7 +129,7 @@ function watchDrag() {
   const sumOf = (timings) => (timings.length === 0 ? [] : [timings.reduce((sum, it) => sum + it.duration, 0)]);
   // Of a draft the move that made it, of an answer its draft's.
   const moves = new WeakMap();
-  let [pictures, began, lastMove, newest] = [[], 0, 0, undefined];
+  let [pictures, frames, began, lastMove, newest] = [[], [], 0, 0, undefined];
   addEventListener('pointermove', (event) => (lastMove = event.timeStamp), { capture: true });
 
   const preview = editor.preview.bind(editor);
@@ -108,30 +144,36 @@ function watchDrag() {
     moves.set(patches, moved);
     return patches;
   };
-  const drawNow = viewer.drawNow.bind(viewer);
-  const pixel = new Uint8Array(4);
-  viewer.drawNow = () => {
-    drawNow();
+  const { screen } = viewer;
+  const drawFrame = screen.drawFrame.bind(screen);
+  screen.drawFrame = () => {
+    drawFrame();
+    frames.push(screen.renderer.getPixelRatio());
     const { draftPatches } = editor;
     if (draftPatches !== undefined && draftPatches !== newest && viewer.wanted === draftPatches) {
       newest = draftPatches;
-      // Waits until it is drawn.
-      const gl = viewer.renderer.getContext();
-      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
-      pictures.push(performance.now() - moves.get(draftPatches));
+      whenDrawn(() => pictures.push(performance.now() - moves.get(draftPatches)));
     }
+  };
+  /** Tells when the frame is drawn, within some milliseconds, without holding the page up. */
+  const whenDrawn = (told) => {
+    const gl = screen.renderer.getContext();
+    const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+    const look = () => (gl.clientWaitSync(fence, 0, 0) === gl.TIMEOUT_EXPIRED ? setTimeout(look, 1) : told());
+    setTimeout(look, 1);
   };
   performance.setResourceTimingBufferSize(100_000);
   globalThis.darnWatch = {
     start() {
-      [pictures, began] = [[], performance.now()];
+      [pictures, frames, began] = [[], [], performance.now()];
     },
     end() {
       const drafts = performance.getEntriesByType('resource').filter((it) => it.name.includes('draft=true'));
       const requests = drafts
         .filter((it) => it.startTime >= began)
         .map(({ duration, serverTiming }) => ({ whole: duration, server: sumOf(serverTiming) }));
-      return { pictures, requests, seconds: (performance.now() - began) / 1000 };
+      return { pictures, frames, requests, seconds: (performance.now() - began) / 1000 };
     },
   };
 }
@@ -158,19 +200,20 @@ async function largeScan() {
   rmSync(folder, { recursive: true });
   const { times, calls, triangles } = await page.evaluate(async (count) => {
     const { viewer } = document.querySelector('darn-editor').shadowRoot.querySelector('darn-stage');
+    const { screen } = viewer;
     const all = [];
-    const gl = viewer.renderer.getContext();
+    const gl = screen.renderer.getContext();
     const pixel = new Uint8Array(4);
     for (let frame = 0; frame < count; frame += 1) {
       await new Promise((done) => requestAnimationFrame(done));
       const start = performance.now();
       viewer.controls.rotateLeft(0.02);
-      viewer.drawNow();
+      screen.drawNow();
       all.push(performance.now() - start);
       // Frames that a processor draws take longer than their script: they must not pile up.
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
     }
-    const { render } = viewer.renderer.info;
+    const { render } = screen.renderer.info;
     return { times: all, calls: render.calls, triangles: render.triangles };
   }, frames);
   await editor.close();

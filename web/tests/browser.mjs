@@ -102,11 +102,29 @@ class EditorPage {
     return this.page.getByRole('button', { name, exact: true });
   }
 
-  /** Waits until nothing is under way and the picture is drawn. */
+  /** Presses keys on a control. */
+  async press(role, name, ...keys) {
+    await this.page.getByRole(role, { name, exact: true }).focus();
+    for (const key of keys) {
+      await this.page.keyboard.press(key);
+    }
+    await this.idle();
+  }
+
+  /** Waits until nothing is under way and the picture is drawn with all pixels. */
   async idle() {
-    await this.page.waitForFunction(() => document.querySelector('darn-editor').editor.work === undefined);
+    await this.still();
     await this.page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
     await this.page.waitForTimeout(100);
+    await this.still();
+  }
+
+  async still() {
+    await this.page.waitForFunction(() => {
+      const element = document.querySelector('darn-editor');
+      const { viewer } = element.shadowRoot.querySelector('darn-stage');
+      return element.editor.work === undefined && !element.editor.isAsking && (viewer?.isStill ?? true);
+    });
   }
 
   async openExample() {
@@ -147,9 +165,17 @@ class EditorPage {
     await this.page.keyboard.press(key);
   }
 
-  /** The picture of the scan as PNG bytes. */
+  /** The picture of the scan as PNG bytes, without the words on it. */
   async picture() {
-    return this.page.locator('darn-stage').screenshot();
+    const show = (visibility) =>
+      this.page.evaluate((value) => {
+        const said = document.querySelector('darn-editor').shadowRoot.querySelector('[role=status]');
+        said.style.visibility = value;
+      }, visibility);
+    await show('hidden');
+    const picture = await this.page.locator('darn-stage').screenshot();
+    await show('');
+    return picture;
   }
 
   /** The share of the picture's points whose colour differs from that of another picture. */

@@ -10,10 +10,7 @@ inEditor(
   async (editor, page) => {
     await editor.openExample();
     const textured = await editor.picture();
-    await page.getByRole('radio', { name: 'Textured' }).focus();
-    for (const key of ['ArrowDown', 'ArrowDown', 'ArrowDown', 'ArrowDown']) {
-      await page.keyboard.press(key);
-    }
+    await editor.press('radio', 'Textured', 'ArrowDown', 'ArrowDown', 'ArrowDown', 'ArrowDown');
     assert.equal(await page.getByRole('radio', { name: 'Curvature' }).isChecked(), true);
     const legend = page.getByRole('group', { name: 'Legend: Curvature' });
     await legend.waitFor();
@@ -146,9 +143,7 @@ inEditor(
     assert.ok(moved.uv[0] > placed.uv[0] + 0.03 && moved.uv[1] < placed.uv[1]);
     assert.equal(await editor.model((it) => it.step.label), 'Move anchor');
 
-    await dot.focus();
-    await page.keyboard.press('ArrowLeft');
-    await page.keyboard.press('Shift+ArrowUp');
+    await editor.press('slider', 'Anchor 1 on the chart', 'ArrowLeft', 'Shift+ArrowUp');
     assert.match(await dot.getAttribute('aria-valuetext'), /^u 0\.\d+, v 0\.\d+$/);
     await page.keyboard.press('Enter');
     await editor.idle();

@@ -106,6 +106,9 @@ export const NAMES: Readonly<Record<DraftKind, string>> = {
   border: 'Border',
 };
 
+/** The radius of a twist on the chart, while nobody has chosen another. */
+export const FIRST_RADIUS = 0.125;
+
 /** A draft that changes nothing yet, in the middle of a patch. */
 export function firstDraft(kind: ClothKind, patch: Patch): ClothDraft {
   const hole = patch.hole.id ?? 0;
@@ -115,7 +118,7 @@ export function firstDraft(kind: ClothKind, patch: Patch): ClothDraft {
     case 'grab':
       return { kind, hole, uv, offset: [0, 0, 0] };
     case 'twist':
-      return { kind, hole, uv, radius: 0.125, axis: point ? normalOf(patch, point) : [0, 1, 0], angle: 0 };
+      return { kind, hole, uv, radius: FIRST_RADIUS, axis: point ? normalOf(patch, point) : [0, 1, 0], angle: 0 };
     case 'pinch':
       return { kind, hole, uvs: [uv, [uv[0] + 0.1, uv[1]]], amount: 0.5 };
     case 'anchor':

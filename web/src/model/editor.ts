@@ -1,18 +1,16 @@
 /** What the editor knows and does, without a page: the scan, its holes, the session, every step and what was chosen. */
 import {
-  type AnchorFound,
   type HoleReport,
   type Info,
-  type MapPiece,
   type Progress,
   type Service,
   type Skipped,
   type Uv,
-  Latest,
   describeError,
   isAbort,
 } from '../client.js';
-import { AnchorMap } from './anchor_map.js';
+import type { AnchorMap } from './anchor_map.js';
+import { AnchorSearch } from './anchor_search.js';
 import { hasChart } from './cloth.js';
 import {
   type Choice,
@@ -23,11 +21,21 @@ import {
   readConstraints,
   statelessMessageOf,
 } from './constraints.js';
-import { type AnchorDraft, type Draft, NAMES, isMaking, madeBy, previewed, withAnchor, withGesture } from './draft.js';
+import {
+  type AnchorDraft,
+  type Draft,
+  FIRST_RADIUS,
+  NAMES,
+  isMaking,
+  madeBy,
+  withAnchor,
+  withGesture,
+} from './draft.js';
 import { type FoundAnchor, type OpenScan, START, type Step, type Tool, type Work } from './editor_state.js';
 import { isFill } from './fills.js';
 import { documentOf } from './gltf_document.js';
 import { History } from './history.js';
+import { LiveDraft } from './live_draft.js';
 import { isHole } from './loops.js';
 import { stepInWords } from './report.js';
 import { fetchedScan } from './scan_files.js';
@@ -48,13 +56,8 @@ export class Editor extends EventTarget {
   /** The loops that the service left as they were at the last mend, with why. */
   skipped: readonly Skipped[] = [];
   tool: Tool = 'look';
-  /** The gesture that is being made, and the cloth as the service answered it last. */
-  draft: Draft | undefined;
-  draftPatches: readonly Patch[] | undefined;
-  /** Of the last anchor search. */
-  found: FoundAnchor | undefined;
-  /** The map that was asked for last. */
-  map: AnchorMap | undefined;
+  /** The radius of the next twist, on the chart. */
+  twistRadius = FIRST_RADIUS;
   work: Work | undefined;
   /** The last error, until the next action. */
   problem: string | undefined;
@@ -63,7 +66,19 @@ export class Editor extends EventTarget {
 
   private history = new History<Step>(START);
   private session: ScanSession | undefined;
-  private readonly live = new Latest();
+  private readonly hand = new LiveDraft({
+    step: () => this.step,
+    session: () => this.session,
+    changed: () => this.changed(),
+    report: (error) => this.report(error),
+  });
+  private readonly search = new AnchorSearch({
+    step: () => this.step,
+    session: () => this.session,
+    changed: () => this.changed(),
+    say: (message) => this.say(message),
+    report: (error) => this.report(error),
+  });
   private readonly wanted = new WantedVariation({
     step: () => this.step,
     isBusy: () => this.work !== undefined,
@@ -78,6 +93,31 @@ export class Editor extends EventTarget {
 
   get step(): Step {
     return this.history.present;
+  }
+
+  /** The gesture that is being made. */
+  get draft(): Draft | undefined {
+    return this.hand.draft;
+  }
+
+  /** The cloth of the draft as the service answered it last. */
+  get draftPatches(): readonly Patch[] | undefined {
+    return this.hand.patches;
+  }
+
+  /** Whether cloth of the draft is on its way. */
+  get isAsking(): boolean {
+    return this.hand.isAsking;
+  }
+
+  /** Of the last anchor search. */
+  get found(): FoundAnchor | undefined {
+    return this.search.found;
+  }
+
+  /** The map that was asked for last. */
+  get map(): AnchorMap | undefined {
+    return this.search.map;
   }
 
   /** The patches that take gestures and anchors: those with a chart. */
@@ -135,8 +175,7 @@ export class Editor extends EventTarget {
       this.chosen = new Set(loops.filter(isHole).map((loop) => loop.id ?? 0));
       this.skipped = [];
       this.acceptDoubtful = false;
-      this.found = undefined;
-      this.dropMap();
+      this.search.forget();
       this.dropDraft();
       const holes = this.chosen.size;
       this.message = `${name} is open: ${holes} ${holes === 1 ? 'hole' : 'holes'} in ${loops.length} boundary loops.`;
@@ -198,27 +237,21 @@ export class Editor extends EventTarget {
 
   /** Shows a gesture while it is made: sends it when the answer to the one before has come. An anchor's place is found only at its commit. */
   preview(draft: Draft): void {
-    this.draft = draft;
-    this.changed();
-    if (previewed(this.step.constraints, draft) === undefined) {
-      return;
+    if (draft.kind === 'twist') {
+      this.twistRadius = draft.radius;
     }
-    this.live.offer(async () => {
-      const { step, session } = this;
-      const constraints = previewed(step.constraints, draft);
-      if (this.draft !== draft || session === undefined || constraints === undefined) {
-        return;
-      }
-      try {
-        const patches = await session.preview(step, constraints);
-        if (this.draft !== undefined && this.step === step) {
-          this.draftPatches = patches;
-          this.changed();
-        }
-      } catch (error) {
-        this.report(error);
-      }
-    });
+    this.hand.show(draft);
+  }
+
+  /** Chooses the radius of the twist that is made, or of the next one. */
+  setTwistRadius(radius: number): void {
+    const { draft } = this;
+    if (draft?.kind === 'twist') {
+      this.preview({ ...draft, radius });
+    } else {
+      this.twistRadius = radius;
+      this.say(`Twist: radius ${radius.toFixed(3)} of the chart.`);
+    }
   }
 
   /** Makes the draft a step. */
@@ -241,9 +274,7 @@ export class Editor extends EventTarget {
 
   /** Forgets the draft. */
   dropDraft(): void {
-    this.draft = undefined;
-    this.draftPatches = undefined;
-    this.changed();
+    this.hand.drop();
   }
 
   /** Shows another of the plausible fills of the mended holes. */
@@ -263,69 +294,25 @@ export class Editor extends EventTarget {
     }
   }
 
-  /** Finds where on a hole's chart a point in space belongs. */
-  private async findAnchor({ hole, position }: AnchorDraft): Promise<FoundAnchor | undefined> {
-    let result: FoundAnchor | undefined;
-    await this.working('Searching', async (progress) => {
-      const query = { hole, target: [...position] };
-      const found = await this.session?.optimizeAnchor(this.step, query, progress);
-      if (found !== undefined) {
-        result = { hole, found };
-        this.found = result;
-        this.message = `Found after ${found.evaluations} evaluations of the network.`;
-      }
-    });
-    return result;
-  }
-
   /** Draws the map of an anchor search while its cells come. Everything else can be done meanwhile. */
-  async drawMap({ hole, position }: AnchorDraft): Promise<void> {
-    this.stopMap();
-    const map = new AnchorMap(hole, position);
-    this.map = map;
+  async drawMap(draft: AnchorDraft): Promise<void> {
     this.problem = undefined;
-    this.say('The map is being drawn.');
-    try {
-      const events = {
-        onFound: (found: AnchorFound): void => {
-          this.found = { hole, found };
-          this.changed();
-        },
-        onMap: (piece: MapPiece): void => {
-          map.add(piece);
-          this.changed();
-        },
-      };
-      const query = { hole, target: [...position] };
-      await this.session?.anchorMap(this.step, query, events, { signal: map.signal });
-      this.say('The map is complete.');
-    } catch (error) {
-      map.stop();
-      this.report(error);
-    }
+    await this.search.drawMap(draft);
   }
 
   /** Ends the map that is being drawn; what is known of it stays. */
   stopMap(): void {
-    if (this.map?.isComing) {
-      this.map.stop();
-      this.say('The map is stopped.');
-    }
-  }
-
-  private dropMap(): void {
-    this.map?.stop();
-    this.map = undefined;
+    this.search.stopMap();
   }
 
   /** Searches the place of an anchor and adds it as a step. */
   private async placeAnchor(draft: AnchorDraft): Promise<void> {
-    if (this.map !== undefined && this.map.target.join() !== draft.position.join()) {
-      this.dropMap();
-    }
-    const uv = (await this.findAnchor(draft))?.found.uv;
+    let uv: Uv | undefined;
+    await this.working('Searching', async (progress) => {
+      uv = await this.search.find(draft, progress);
+    });
     if (uv !== undefined) {
-      const constraints = withAnchor(this.step.constraints, draft, uv as Uv);
+      const constraints = withAnchor(this.step.constraints, draft, uv);
       await this.apply(draft.hard ? 'Hard anchor' : NAMES.anchor, this.step, constraints);
     }
   }
@@ -419,13 +406,17 @@ export class Editor extends EventTarget {
 
   /** Fills holes under constraints. */
   private async apply(label: string, choice: Choice, constraints: ClothConstraints): Promise<void> {
+    const { step } = this;
     await this.working(label, async (progress) => {
       if (choice.selection !== undefined || choice.holes.length + choice.made.length > 0) {
         await this.take(label, { choice, constraints }, progress);
         this.dispatchEvent(new Event('edited'));
       }
     });
-    this.dropDraft();
+    // What is refused can be changed.
+    if (this.step !== step) {
+      this.dropDraft();
+    }
   }
 
   /** Asks the service for a state and makes it a step. */
@@ -456,8 +447,7 @@ export class Editor extends EventTarget {
     move();
     if (this.step !== before) {
       this.message = `${word}. Now: ${this.step.label}.`;
-      this.found = undefined;
-      this.dropMap();
+      this.search.forget();
       this.problem = undefined;
     }
     this.dropDraft();
@@ -477,7 +467,7 @@ export class Editor extends EventTarget {
     show(label, undefined);
     try {
       // A gesture's last preview must not come after the answer to this.
-      await this.live.settled();
+      await this.hand.settled();
       await task({
         signal: stop.signal,
         onSent: (share) => show(share < 1 ? label : 'Computing', share < 1 ? share : undefined),

@@ -73,7 +73,6 @@ export class Gestures {
   private hold: Hold | undefined;
   private firstOfPinch: ClothPoint | undefined;
   private heldAxis: string | undefined;
-  private radius = 0.125;
   private firstOfBorder: Vector3 | undefined;
   /** The new cloth under a pointer that is not down, while a twist is chosen. */
   private hovered: ClothPoint | undefined;
@@ -112,7 +111,7 @@ export class Gestures {
   get disk(): Disk | undefined {
     const { tool, work } = this.editor;
     const point = this.hold === undefined ? this.hovered : this.hold.cloth?.point;
-    return tool === 'twist' && work === undefined && point ? { point, radius: this.radius } : undefined;
+    return tool === 'twist' && work === undefined && point ? { point, radius: this.editor.twistRadius } : undefined;
   }
 
   /** Forgets the gesture that is being made. */
@@ -195,7 +194,7 @@ export class Gestures {
   /** Takes the nearest of some points that a draft has; false where none is near to the pointer. */
   private takeHandle(event: PointerEvent, points: readonly Vec3[]): boolean {
     const handles = points.map((point) => new Vector3(...point));
-    const held = this.viewer.nearestOf(handles, { x: event.clientX, y: event.clientY }, REACH);
+    const held = this.viewer.aim.nearestOf(handles, { x: event.clientX, y: event.clientY }, REACH);
     if (held === undefined) {
       return false;
     }
@@ -280,7 +279,7 @@ export class Gestures {
     const isEnd = part < endsOf(draft);
     const target = isEnd
       ? this.viewer.nearestOfBorder(clientX, clientY)
-      : this.viewer.onScreenPlane(clientX, clientY, hit.position);
+      : this.viewer.aim.onScreenPlane(clientX, clientY, hit.position);
     return target && withHandle(draft, part, target.toArray());
   }
 
@@ -345,11 +344,11 @@ export class Gestures {
       case 'twist':
         return cloth && this.twisted(cloth, event.clientX - hold.x);
       case 'anchor': {
-        const target = this.viewer.onScreenPlane(event.clientX, event.clientY, hold.hit.position);
+        const target = this.viewer.aim.onScreenPlane(event.clientX, event.clientY, hold.hit.position);
         return target && this.anchorAt(hold, target);
       }
       case 'cut': {
-        const edge = this.viewer.onScreenPlane(event.clientX, event.clientY, hold.hit.position);
+        const edge = this.viewer.aim.onScreenPlane(event.clientX, event.clientY, hold.hit.position);
         const radius = edge?.distanceTo(hold.hit.position) ?? 0;
         return radius > 0 ? { kind: 'cut', center: hold.hit.position.toArray(), radius } : undefined;
       }
@@ -366,8 +365,8 @@ export class Gestures {
     const { clientX, clientY } = event;
     const axis = event.shiftKey ? normal : AXES.get(this.heldAxis ?? '');
     const target = axis
-      ? this.viewer.onLine(clientX, clientY, position, axis)
-      : this.viewer.onScreenPlane(clientX, clientY, position);
+      ? this.viewer.aim.onLine(clientX, clientY, position, axis)
+      : this.viewer.aim.onScreenPlane(clientX, clientY, position);
     const { hole, uv } = point;
     return target && { kind: 'grab', hole, uv, offset: target.sub(position).toArray() };
   }
@@ -379,7 +378,7 @@ export class Gestures {
       axis.negate();
     }
     const { hole, uv } = point;
-    return { kind: 'twist', hole, uv, radius: this.radius, axis: axis.toArray(), angle: -pixels * TURN };
+    return { kind: 'twist', hole, uv, radius: this.editor.twistRadius, axis: axis.toArray(), angle: -pixels * TURN };
   }
 
   private anchorAt({ cloth }: Hold, target: Vector3): Draft {
@@ -425,13 +424,8 @@ export class Gestures {
     this.hovered = cloth;
     event.preventDefault();
     event.stopImmediatePropagation();
-    const radius = this.radius * RADIUS.step ** -Math.sign(event.deltaY);
-    this.radius = Math.min(Math.max(radius, RADIUS.least), RADIUS.most);
-    if (draft?.kind === 'twist') {
-      this.editor.preview({ ...draft, radius: this.radius });
-    } else {
-      this.editor.say(`Twist: radius ${this.radius.toFixed(3)} of the chart.`);
-    }
+    const radius = this.editor.twistRadius * RADIUS.step ** -Math.sign(event.deltaY);
+    this.editor.setTwistRadius(Math.min(Math.max(radius, RADIUS.least), RADIUS.most));
   }
 
   private key(event: KeyboardEvent, down: boolean): void {

@@ -16,6 +16,7 @@ import {
   SphereGeometry,
   Vector3,
 } from '../vendor.js';
+import { MOVES } from './still_layer.js';
 
 /** Radius of a handle in CSS pixels. */
 const HANDLE_RADIUS = 7;
@@ -69,9 +70,22 @@ export class Marks {
   });
   private readonly lineMaterial = new LineBasicMaterial({ color: HAND, depthTest: false, transparent: true });
 
-  /** Shows these marks in place of those before. */
-  show({ handles = [], tethers = [], ring = [], disk, ball, stretches = [], dashes = [] }: Marked): void {
+  /** Those that are shown, as a text to compare. */
+  private shown = '{}';
+
+  /** Shows these marks in place of those before. Whether they are others. */
+  show(marked: Marked): boolean {
+    const text = JSON.stringify(marked);
+    if (text === this.shown) {
+      return false;
+    }
     this.clear();
+    this.shown = text;
+    this.add(marked);
+    return true;
+  }
+
+  private add({ handles = [], tethers = [], ring = [], disk, ball, stretches = [], dashes = [] }: Marked): void {
     if (ball !== undefined) {
       const mark = new Mesh(this.ball, this.cutMaterial);
       mark.position.copy(ball.center);
@@ -103,10 +117,14 @@ export class Marks {
     if (ring.length > 0) {
       this.group.add(new LineLoop(lineGeometry(ring), this.lineMaterial));
     }
-    this.group.children.forEach((mark) => (mark.renderOrder = 10));
+    for (const mark of this.group.children) {
+      mark.renderOrder = 10;
+      mark.layers.set(MOVES);
+    }
   }
 
   clear(): void {
+    this.shown = '{}';
     for (const mark of this.group.children) {
       if (mark instanceof Line2) {
         mark.geometry.dispose();

@@ -1,6 +1,6 @@
 /** How things are drawn, and the comparison with the scan as it was. */
 import type { Look } from '../scene/viewer.js';
-import { type TemplateResult, css, html } from '../vendor.js';
+import { type TemplateResult, html } from '../vendor.js';
 import { Panel } from './panel.js';
 
 const SHADINGS = [
@@ -14,26 +14,6 @@ const SHADINGS = [
 
 /** The event `darn-look` carries what has changed of the look in `detail`. */
 export class LookPanel extends Panel {
-  static override styles = [
-    Panel.styles,
-    css`
-      fieldset {
-        margin: 0 0 0.5rem;
-        padding: 0;
-        border: 0;
-      }
-      label {
-        display: inline-flex;
-        align-items: center;
-        gap: 4px;
-        min-height: 28px;
-      }
-      .compare {
-        display: block;
-      }
-    `,
-  ].flat();
-
   static override properties = { shown: {} };
 
   /** What is drawn, as it was chosen here or elsewhere. */
@@ -47,7 +27,7 @@ export class LookPanel extends Panel {
         <div class="row">
           ${SHADINGS.map(
             ([shading, name]) => html`
-              <label>
+              <label class="choice">
                 <input
                   type="radio"
                   name="shading"
@@ -61,7 +41,7 @@ export class LookPanel extends Panel {
       </fieldset>
       <div>${this.check('New cloth in its own colour', 'tinted')}</div>
       <div>${this.check('Outlines of holes and borders', 'outlined')}</div>
-      <label class="compare">
+      <label>
         Before and after (hold B for before)
         <input
           type="range"
@@ -77,7 +57,9 @@ export class LookPanel extends Panel {
 
   private check(name: string, part: 'tinted' | 'outlined'): TemplateResult {
     const changed = (event: Event): void => this.look({ [part]: (event.target as HTMLInputElement).checked });
-    return html`<label><input type="checkbox" .checked=${this.shown[part]} @change=${changed} />${name}</label>`;
+    return html`<label class="choice"
+      ><input type="checkbox" .checked=${this.shown[part]} @change=${changed} />${name}</label
+    >`;
   }
 
   private look(detail: Partial<Look>): void {

@@ -1,27 +1,10 @@
 /** What is saved, and how: the look of the new cloth in the file, and a picture. */
 import { SAVED_LOOKS, type SavedLook } from '../model/saved_look.js';
-import { type TemplateResult, css, html, nothing } from '../vendor.js';
+import { type TemplateResult, html, nothing } from '../vendor.js';
 import { Panel } from './panel.js';
 
 /** The event `darn-saved-look` carries the look that was chosen in `detail`; `darn-picture` asks for the picture as a file. */
 export class SavePanel extends Panel {
-  static override styles = [
-    Panel.styles,
-    css`
-      fieldset {
-        margin: 0 0 0.5rem;
-        padding: 0;
-        border: 0;
-      }
-      label {
-        display: flex;
-        align-items: center;
-        gap: 4px;
-        min-height: 28px;
-      }
-    `,
-  ].flat();
-
   static override properties = { look: {} };
 
   /** How the new cloth of a saved scan looks. */
@@ -41,7 +24,7 @@ export class SavePanel extends Panel {
         <legend class="quiet small">New cloth in the saved scan</legend>
         ${SAVED_LOOKS.map(
           ([look, , name]) => html`
-            <label>
+            <label class="choice">
               <input
                 type="radio"
                 name="saved-look"

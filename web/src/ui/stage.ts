@@ -8,6 +8,9 @@ import { type TemplateResult, css, html } from '../vendor.js';
 import { heatLegend, legendStyles } from './heat_legend.js';
 import { Panel } from './panel.js';
 
+/** Milliseconds in which the service answers a draft, as a rule. */
+const ANSWER = 60;
+
 export class Stage extends Panel {
   static override styles = [
     Panel.styles,
@@ -100,13 +103,14 @@ export class Stage extends Panel {
     this.viewer?.chooseLoops(this.editor.chosen);
     void this.viewer?.showPatches(this.editor.patches);
     this.viewer?.showCut(this.editor.step.cutFaces);
-    this.viewer?.marks.show(
+    this.viewer?.mark(
       marksOf(this.editor, {
         cloth: this.gestures?.waitingPoint,
         border: this.gestures?.waitingEnd,
         disk: this.gestures?.disk,
         stretch: (edge, facing) => this.viewer?.stretchBetween(edge, facing) ?? [],
       }),
+      this.editor.isAsking ? ANSWER : 0,
     );
   }
 

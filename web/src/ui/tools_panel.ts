@@ -109,6 +109,9 @@ function commitWord(draft: Draft): string {
   return draft.kind === 'anchor' && draft.uv !== undefined ? 'Apply' : COMMIT[draft.kind];
 }
 
+/** What the first two fields of a gesture are. */
+const PLACE = html`<span class="wide quiet small">u and v: the place on the chart, from 0 to 1</span>`;
+
 const AXIS_NAMES = ['x', 'y', 'z'] as const;
 
 export class ToolsPanel extends Panel {
@@ -134,13 +137,6 @@ export class ToolsPanel extends Panel {
         display: flex;
         gap: 12px;
         margin: 0;
-        padding: 0;
-        border: 0;
-      }
-      .check {
-        display: flex;
-        align-items: center;
-        gap: 4px;
       }
     `,
   ].flat();
@@ -182,7 +178,8 @@ export class ToolsPanel extends Panel {
     if (kind === 'cut' || kind === 'polygon' || kind === 'border') {
       return scan && firstMaking(kind, scan);
     }
-    return patch && firstDraft(kind, patch);
+    const first = patch && firstDraft(kind, patch);
+    return first?.kind === 'twist' ? { ...first, radius: this.editor.twistRadius } : first;
   }
 
   private form(draft: Draft | undefined): TemplateResult | typeof nothing {
@@ -260,7 +257,7 @@ export class ToolsPanel extends Panel {
 
   private grabFields(draft: GrabDraft): TemplateResult {
     return html`
-      ${this.uvFields(draft.uv, '', (uv) => ({ ...draft, uv }))}
+      ${PLACE} ${this.uvFields(draft.uv, '', (uv) => ({ ...draft, uv }))}
       <span></span>
       ${this.vectorFields('Move', draft.offset, (offset) => ({ ...draft, offset }))}
     `;
@@ -269,7 +266,7 @@ export class ToolsPanel extends Panel {
   private twistFields(draft: TwistDraft): TemplateResult {
     const degrees = (draft.angle * 180) / Math.PI;
     return html`
-      ${this.uvFields(draft.uv, '', (uv) => ({ ...draft, uv }))}
+      ${PLACE} ${this.uvFields(draft.uv, '', (uv) => ({ ...draft, uv }))}
       ${this.number('Radius', draft.radius, (radius) => ({ ...draft, radius }))}
       ${this.vectorFields('Axis', draft.axis, (axis) => ({ ...draft, axis }))}
       ${this.number('Angle in degrees', degrees, (value) => ({ ...draft, angle: (value * Math.PI) / 180 }))}
@@ -299,7 +296,7 @@ export class ToolsPanel extends Panel {
     };
     return html`
       ${this.vectorFields('Point', draft.position, (position) => ({ ...draft, position }))} ${this.placeFields(draft)}
-      <label class="wide check">
+      <label class="wide choice">
         <input type="checkbox" .checked=${draft.hard} @change=${hard} />
         Hard: refuse it where the cloth cannot reach it
       </label>
@@ -350,7 +347,7 @@ export class ToolsPanel extends Panel {
         <legend class="quiet small">Shape</legend>
         ${SHAPES.map(
           ([tool, name]) => html`
-            <label class="check">
+            <label class="choice">
               <input
                 type="radio"
                 name="shape"
