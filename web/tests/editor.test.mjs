@@ -57,7 +57,7 @@ inEditor('the example is opened, mended, grabbed, undone, redone and saved', asy
 
 inEditor('other fills are stepped through by keyboard, undone and saved', async (editor, page, service) => {
   const fills = page.getByRole('group', { name: 'Fills' });
-  const [previous, next] = ['Previous fill', 'Next fill'].map((name) => editor.button(name));
+  const next = editor.button('Next fill');
   // As they are drawn: on the example the fills lie closer together than a picture shows.
   const positions = () =>
     page.evaluate(() => {
@@ -65,16 +65,13 @@ inEditor('other fills are stepped through by keyboard, undone and saved', async 
       return [...stage.viewer.patches[0].mesh.geometry.getAttribute('position').array];
     });
   await editor.openExample();
-  assert.equal(await next.isDisabled(), true);
+  assert.equal(await next.count(), 0, 'nothing is mended');
   await editor.mend();
   const first = await positions();
-  await previous.focus();
-  await page.keyboard.press('Enter');
+  await editor.press('button', 'Previous fill', 'Enter');
   assert.equal(await editor.model((it) => it.alternative), 0, 'there is none before the first');
 
-  await next.focus();
-  await page.keyboard.press('Enter');
-  await page.keyboard.press('Enter');
+  await editor.press('button', 'Next fill', 'Enter', 'Enter');
   await page.getByRole('status').getByText('Fill 3 of 8, beside the likeliest.').waitFor();
   await editor.idle();
   await fills.getByText('Fill 3 of 8').waitFor();
@@ -170,34 +167,35 @@ inEditor('twist, pinch and anchor are steps, and undo goes back to the start', a
 });
 
 inEditor('everything can be done by keyboard', async (editor, page) => {
-  const press = async (role, name, key = 'Enter') => {
-    await page.getByRole(role, { name, exact: true }).focus();
-    await page.keyboard.press(key);
-    await editor.idle();
-  };
-  await press('button', 'Try the example');
+  await editor.press('button', 'Try the example', 'Enter');
   await page.getByText('Holes (1)').waitFor();
-  await press('checkbox', 'Choose Hole 1', 'Space');
+  await editor.press('checkbox', 'Choose Hole 1', 'Space');
   assert.equal(await editor.button('Mend 0 holes').isDisabled(), true);
-  await press('checkbox', 'Choose Hole 1', 'Space');
-  await press('button', 'Mend 1 hole');
-  await press('button', 'Grab');
+  await editor.press('checkbox', 'Choose Hole 1', 'Space');
+  await editor.press('button', 'Mend 1 hole', 'Enter');
+  await editor.press('button', 'Grab', 'Enter');
   await page.getByLabel('Move y').fill('0.03');
   await page.keyboard.press('Enter');
   await editor.idle();
   const { edits } = JSON.parse(await editor.model((it) => it.constraintsText()));
   assert.deepEqual(edits[0].grab.offset, [0, 0.03, 0]);
   assert.match(await page.getByRole('status').textContent(), /Grab: 1 filled/);
-  await press('button', 'Anchor');
+  await editor.press('button', 'Anchor', 'Enter');
   await page.getByLabel('Point y').fill('5');
   await page.getByLabel(/Hard/).focus();
   await page.keyboard.press('Space');
-  await press('button', 'Find its place');
+  await editor.press('button', 'Find its place', 'Enter');
   await page.getByRole('alert').waitFor();
   const refusal = await page.getByRole('alert').locator('p').textContent();
   assert.match(refusal, /^Anchor 1: the cloth stays .* can reach.*\nMove the point nearer .*$/);
   assert.equal(refusal.split('the cloth stays').length, 2, 'it is said once');
   assert.doesNotMatch(refusal, /\/anchors/);
+  assert.equal(await page.getByLabel('Point y').inputValue(), '5', 'what was refused can be changed');
+  assert.equal(await page.getByLabel(/Hard/).isChecked(), true);
+  await editor.press('checkbox', 'Hard: refuse it where the cloth cannot reach it', 'Space');
+  await editor.press('button', 'Find its place', 'Enter');
+  assert.equal(await editor.model((it) => it.step.label), 'Anchor');
+  assert.equal(await editor.model((it) => it.draft), undefined);
 });
 
 inEditor(
@@ -233,6 +231,8 @@ inEditor('a busy service is waited for as long as it says', async (editor, page)
   });
   await editor.button('Mend 1 hole').click();
   await page.locator('.notice').getByText('The service is busy; waiting 1 s').waitFor();
+  const share = await page.locator('.notice progress').evaluate((it) => it.position);
+  assert.equal(share, -1, 'nobody knows how long it takes: the bar moves to and fro');
   await page.getByText('✓ mended').waitFor();
   assert.equal(refusals, 2);
 });

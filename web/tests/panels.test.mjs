@@ -166,6 +166,8 @@ inEditor(
     await editor.idle();
     const wider = await page.evaluate(twistMarks);
     assert.ok(Math.abs(wider.radius / hovered.radius - 1.1) < 1e-3, 'the wheel changes it before a drag');
+    const field = page.getByLabel('Radius');
+    assert.equal(await field.inputValue(), '0.1375', 'the field shows it');
     await page.mouse.down();
     await editor.idle();
     const pressed = await page.evaluate(twistMarks);
@@ -176,8 +178,42 @@ inEditor(
     await page.mouse.move(aside.x + 20, aside.y + 20);
     await editor.idle();
     assert.equal((await page.evaluate(twistMarks)).radius, 0, 'away from the cloth there is none');
+    await field.fill('0.25');
+    await page.keyboard.press('Tab');
+    await editor.idle();
+    assert.ok(
+      Math.abs((await page.evaluate(twistMarks)).radius / hovered.radius - 2) < 1e-3,
+      'the disk shows the field',
+    );
+    await page.mouse.move(middle.x, middle.y);
+    await page.mouse.wheel(0, 100);
+    await editor.idle();
+    assert.equal(await field.inputValue(), '0.227273', 'the wheel goes on from there');
   },
 );
+
+inEditor('what was done and what can be done next is seen on the picture', async (editor, page) => {
+  const said = page.getByRole('status');
+  const isSeen = async () => {
+    const [words, stage] = [await said.boundingBox(), await page.locator('darn-stage').boundingBox()];
+    return words.height > 15 && words.y > stage.y && words.y + words.height < stage.y + stage.height;
+  };
+  assert.equal(await isSeen(), false, 'there is nothing to say');
+  await editor.openExample();
+  await said.getByText('scarf_hole.glb is open: 1 hole').waitFor();
+  assert.equal(await isSeen(), true);
+  const main = page.locator('#mend.main');
+  assert.equal(await main.count(), 1);
+  await editor.mend();
+  assert.equal(await main.count(), 0, 'it is done');
+  await editor.tool('p');
+  const { x, y } = await editor.onCloth();
+  await page.mouse.click(x, y);
+  await said.getByText('Pinch: click the second point.').waitFor();
+  assert.equal(await isSeen(), true);
+  await editor.button('None').click();
+  assert.equal(await main.count(), 1, 'another mend would change something');
+});
 
 /** Where the camera is and what it turns about. */
 function cameraNow() {

@@ -231,6 +231,29 @@ test('a fill that is refused or stopped is none, and what waited for it is forgo
   assert.equal(editor.step.label, 'Grab');
 });
 
+test('a gesture that is refused can be changed, one that is applied is over', async () => {
+  const { service, asked } = serviceOfFills();
+  const editor = new Editor(service);
+  await editor.open(new Blob(['scan']), 'scan.glb');
+  const mended = editor.mend();
+  await settled();
+  asked[0].answer();
+  await mended;
+  const draft = { kind: 'grab', hole: 1, uv: [0.2, 0.2], offset: [0, 1, 0] };
+  editor.preview(draft);
+  const refused = editor.commit();
+  await settled();
+  asked.at(-1).refuse(new Error('too far'));
+  await refused;
+  assert.equal(editor.problem, 'Too far.');
+  assert.equal(editor.draft, draft);
+  const applied = editor.commit();
+  await settled();
+  asked.at(-1).answer();
+  await applied;
+  assert.deepEqual([editor.step.label, editor.draft], ['Grab', undefined]);
+});
+
 test('a place on cloth keeps its uv and follows the positions', () => {
   const hole = { id: 3, patchFaces: [0, 1, 2, 2, 1, 3], patchUvs: [0, 0, 1, 0, 0, 1, 1, 1] };
   const flat = { hole, positions: new Float32Array([0, 0, 0, 2, 0, 0, 0, 2, 0, 2, 2, 0]) };

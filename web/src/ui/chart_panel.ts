@@ -75,7 +75,7 @@ export class ChartPanel extends Panel {
     const map = this.editor.tool === 'anchor' && this.editor.map?.hole === hole ? this.editor.map.losses : [];
     const range = rangeOf(map);
     const path = (search?.path ?? []).map(({ cell }) => uvOfCell(cell ?? []));
-    const dots = this.dots(hole);
+    const [dots, gestures] = [this.dots(hole), this.gestures(hole)];
     return html`
       <h2>Chart of hole ${hole}</h2>
       <svg viewBox="0 0 ${SIDE} ${SIDE}" role="group" aria-label=${this.words(hole)}>
@@ -86,10 +86,15 @@ export class ChartPanel extends Panel {
             ? svg`<polyline points=${path.map((uv) => at(uv).join()).join(' ')} fill="none" stroke="#0b7285" stroke-width="2" />`
             : nothing
         }
-        ${this.gestures(hole).map((uv) => place(uv, '#ffffff'))}
+        ${gestures.map((uv) => place(uv, '#ffffff'))}
         ${draft ? placesOf(draft).map((uv) => place(uv, '#22b8cf')) : nothing}
         ${search?.uv ? cross(search.uv as Uv) : nothing} ${dots.map((it) => this.anchorDot(it, patch))}
       </svg>
+      ${
+        search !== undefined || dots.length + gestures.length > 0
+          ? html`<p class="quiet small">White: gestures; yellow: anchors; the cross: where the last search ended.</p>`
+          : nothing
+      }
       ${
         dots.length > 0
           ? html`<p class="quiet small">

@@ -53,8 +53,12 @@ export class EditorElement extends LitElement {
         margin: 0 0.75rem 0 0;
         font-size: 1.05rem;
       }
-      header .space {
+      .name {
         flex: 1;
+        min-width: 3rem;
+        overflow: hidden;
+        text-overflow: ellipsis;
+        white-space: nowrap;
       }
       main {
         position: relative;
@@ -110,6 +114,19 @@ export class EditorElement extends LitElement {
       .problem p {
         white-space: pre-line;
       }
+      .said {
+        position: absolute;
+        left: 12px;
+        bottom: 12px;
+        max-width: calc(100% - 24px);
+        box-sizing: border-box;
+        padding: 3px 10px;
+        border: 1px solid var(--line);
+        border-radius: 6px;
+        background: var(--surface);
+        font-size: 12px;
+        pointer-events: none;
+      }
       progress {
         width: 100%;
         height: 8px;
@@ -123,6 +140,16 @@ export class EditorElement extends LitElement {
         clip-path: inset(50%);
       }
       @media (max-width: 720px) {
+        /* Beside the button before it, so that the others are in a row of their own. */
+        .name {
+          min-width: calc(100% - 185px);
+        }
+        #undo {
+          margin-left: auto;
+        }
+        #another {
+          display: none;
+        }
         :host {
           grid-template: auto 55% 1fr / 1fr;
         }
@@ -220,9 +247,8 @@ export class EditorElement extends LitElement {
       <header>
         <h1>darn</h1>
         <button @click=${this.pick}>Open a scan</button>
-        <button @click=${this.openExample} ?hidden=${scan === undefined}>Open the example</button>
-        <span class="quiet">${scan?.name ?? ''}</span>
-        <span class="space"></span>
+        <button id="another" @click=${this.openExample} ?hidden=${scan === undefined}>Open the example</button>
+        <span class="quiet name" title=${scan?.name ?? ''}>${scan?.name ?? ''}</span>
         <button
           id="undo"
           ?disabled=${editor.undoLabel === undefined || work !== undefined}
@@ -258,7 +284,7 @@ export class EditorElement extends LitElement {
       </header>
       <main class=${this.dragging ? 'over' : ''}>
         <darn-stage .editor=${editor}></darn-stage>
-        ${scan === undefined && work === undefined ? this.welcome() : nothing} ${this.notices()}
+        ${scan === undefined && work === undefined ? this.welcome() : nothing} ${this.notices()} ${this.said()}
       </main>
       <aside
         @darn-frame=${this.frame}
@@ -281,7 +307,6 @@ export class EditorElement extends LitElement {
         }
       </aside>
       <darn-key></darn-key>
-      <div class="hidden" role="status" aria-live="polite">${editor.work?.label ?? editor.message}</div>
     `;
   }
 
@@ -298,6 +323,15 @@ export class EditorElement extends LitElement {
           <button id="example" @click=${this.openExample}>Try the example</button>
         </div>
       </div>
+    `;
+  }
+
+  /** The last result, or what can be done next; what is under way is seen as a notice already. */
+  private said(): TemplateResult {
+    const { work, problem, message } = this.editor;
+    const isSeen = work === undefined && problem === undefined && message !== '';
+    return html`
+      <div class=${isSeen ? 'said' : 'hidden'} role="status" aria-live="polite">${work?.label ?? message}</div>
     `;
   }
 
@@ -320,11 +354,7 @@ export class EditorElement extends LitElement {
           ${work.label} …
           <button @click=${() => work.stop.abort()}>Stop</button>
         </div>
-        <progress
-          aria-label=${work.label}
-          .value=${work.share ?? 0}
-          ?indeterminate=${work.share === undefined}
-        ></progress>
+        <progress aria-label=${work.label} value=${work.share ?? nothing}></progress>
       </div>
     `;
   }

@@ -65,7 +65,7 @@ export class HolesPanel extends Panel {
   private lastClicked: number | undefined;
 
   protected override render(): TemplateResult {
-    const { scan, chosen, work } = this.editor;
+    const { scan, chosen, work, step } = this.editor;
     const loops = scan?.loops ?? [];
     const holes = loops.filter(isHole).map((loop) => loop.id ?? 0);
     return html`
@@ -74,15 +74,31 @@ export class HolesPanel extends Panel {
       ${holes.length === 0 ? html`<p>This scan has no holes to fill.</p>` : nothing} ${this.candidates()} ${this.made()}
       ${this.doubtful()}
       <div class="row">
-        <button class="main" id="mend" ?disabled=${chosen.size === 0 || work !== undefined} @click=${this.mend}>
+        <button
+          class=${this.isNew ? 'main' : ''}
+          id="mend"
+          ?disabled=${chosen.size === 0 || work !== undefined}
+          @click=${this.mend}
+        >
           Mend ${chosen.size === 1 ? '1 hole' : `${chosen.size} holes`}
         </button>
         <button ?disabled=${holes.length === 0} @click=${() => this.editor.choose(new Set(holes))}>All</button>
         <button ?disabled=${chosen.size === 0} @click=${() => this.editor.choose(new Set())}>None</button>
       </div>
-      <darn-fill .editor=${this.editor}></darn-fill>
-      <darn-texture .editor=${this.editor}></darn-texture>
+      ${
+        step.patches.length === 0
+          ? nothing
+          : html`<darn-fill .editor=${this.editor}></darn-fill> <darn-texture .editor=${this.editor}></darn-texture>`
+      }
     `;
+  }
+
+  /** Whether a mend would fill others than are filled now. */
+  private get isNew(): boolean {
+    const { chosen, step, scan, acceptDoubtful } = this.editor;
+    const filled = step.holes.filter((id) => scan?.loops.some((loop) => loop.id === id));
+    const isSame = chosen.size === filled.length && filled.every((id) => chosen.has(id));
+    return !isSame || acceptDoubtful !== step.acceptDoubtful;
   }
 
   /** The choice to apply patches that were made and not applied, once there are such. */
@@ -190,7 +206,7 @@ export class HolesPanel extends Panel {
         <button @click=${() => this.frame(id)} aria-label="Show ${name}, length ${short(loop.length)}">
           ${name}${filled ? ' ✓ mended' : ''}
         </button>
-        <span class="quiet small">${short(loop.length)} · ${loop.vertices} vertices</span>
+        <span class="quiet small">${short(loop.length)} long · ${loop.vertices} vertices</span>
         ${sureness(loop)} ${skip ? html`<span class="why quiet small">Left open: ${skip.reason}.</span>` : nothing}
       </li>
     `;
