@@ -517,6 +517,8 @@ export interface components {
             texture?: string;
             /** @description Which of the plausible fills of each hole is applied: 0, the likeliest, to 7. Where one lies on one side of the likeliest (1, 3, 5), the next lies on the other (2, 4, 6); the larger the number, the rarer such a fill. Left out: 0. A hole that a smooth surface closes has one fill only. */
             alternative?: number;
+            /** @description Where the patches of a glTF go that came in several files: `data` (into the glTF, in a data URI) or `file` (into a file of their own, `darn-patch-1.bin`; the answer is then a zip or a GLB). Left out: `data`. */
+            patchBuffer?: string;
         };
         /** @description One hole, by exactly one of its fields. */
         HoleSelector: {
@@ -1465,6 +1467,8 @@ export interface operations {
             /** @description A scan or constraints that cannot be mended; `errors` names the constraints. With code `no_holes`: the scan has no hole to fill */
             422: {
                 headers: {
+                    /** @description How it went: `filled=3 skipped=1 doubtful=0`; skipped are holes that should have been filled and could not be */
+                    "darn-result"?: string;
                     [name: string]: unknown;
                 };
                 content: {
@@ -1576,6 +1580,8 @@ export interface operations {
             /** @description A scan whose holes cannot be found, or constraints, which are not taken here */
             422: {
                 headers: {
+                    /** @description How it went: `filled=3 skipped=1 doubtful=0`; skipped are holes that should have been filled and could not be */
+                    "darn-result"?: string;
                     [name: string]: unknown;
                 };
                 content: {
@@ -1688,6 +1694,8 @@ export interface operations {
             /** @description A scan or a query that cannot be searched; `errors` names the fields of the query */
             422: {
                 headers: {
+                    /** @description How it went: `filled=3 skipped=1 doubtful=0`; skipped are holes that should have been filled and could not be */
+                    "darn-result"?: string;
                     [name: string]: unknown;
                 };
                 content: {
@@ -1808,6 +1816,8 @@ export interface operations {
             /** @description With code `nothing_to_strip`: the scan has nothing of darn's */
             422: {
                 headers: {
+                    /** @description How it went: `filled=3 skipped=1 doubtful=0`; skipped are holes that should have been filled and could not be */
+                    "darn-result"?: string;
                     [name: string]: unknown;
                 };
                 content: {
@@ -1872,6 +1882,8 @@ export interface operations {
                 headers: {
                     /** @description The session's path */
                     location?: string;
+                    /** @description How it went: `filled=3 skipped=1 doubtful=0`; skipped are holes that should have been filled and could not be */
+                    "darn-result"?: string;
                     [name: string]: unknown;
                 };
                 content: {
@@ -1919,6 +1931,8 @@ export interface operations {
             /** @description A scan that cannot be mended, or constraints: they choose holes and weights here, anchors and edits come later */
             422: {
                 headers: {
+                    /** @description How it went: `filled=3 skipped=1 doubtful=0`; skipped are holes that should have been filled and could not be */
+                    "darn-result"?: string;
                     [name: string]: unknown;
                 };
                 content: {
@@ -2209,6 +2223,8 @@ export interface operations {
             /** @description Constraints that cannot be met, or that choose holes or weights; `errors` names them */
             422: {
                 headers: {
+                    /** @description How it went: `filled=3 skipped=1 doubtful=0`; skipped are holes that should have been filled and could not be */
+                    "darn-result"?: string;
                     [name: string]: unknown;
                 };
                 content: {
@@ -2340,6 +2356,8 @@ export interface operations {
             /** @description A query that cannot be searched; `errors` names its fields */
             422: {
                 headers: {
+                    /** @description How it went: `filled=3 skipped=1 doubtful=0`; skipped are holes that should have been filled and could not be */
+                    "darn-result"?: string;
                     [name: string]: unknown;
                 };
                 content: {
@@ -2625,6 +2643,8 @@ export interface operations {
             /** @description Constraints that are valid with no scan; `errors` names them. With code `idempotency_mismatch`: the key came before with another payload; with code `webhooks_off`: the service has no secret to sign webhooks with. What is wrong with the scan itself becomes the job's `problem` */
             422: {
                 headers: {
+                    /** @description How it went: `filled=3 skipped=1 doubtful=0`; skipped are holes that should have been filled and could not be */
+                    "darn-result"?: string;
                     [name: string]: unknown;
                 };
                 content: {
