@@ -324,6 +324,13 @@ inEditor('B and the slider show the scan as it was', async (editor, page) => {
   await page.getByRole('slider', { name: /Before and after/ }).fill('0');
   await editor.idle();
   assert.ok((await editor.difference(mended, await editor.picture())) < 0.002);
+  await page.getByRole('slider', { name: /Before and after/ }).fill('0.5');
+  await drop(page, 'scarf.glb', EXAMPLE);
+  await page
+    .getByRole('status')
+    .getByText(/scarf\.glb is open/)
+    .waitFor();
+  assert.equal(await page.getByRole('slider', { name: /Before and after/ }).inputValue(), '0', 'of another scan all');
 });
 
 inEditor('the address of a scan in #scan= is opened', async (editor, page, service) => {

@@ -29,6 +29,7 @@ import './stage.js';
 import type { Stage } from './stage.js';
 import { shared } from './styles.js';
 import { TOOLS, needsCloth } from './tools_panel.js';
+import { welcome } from './welcome.js';
 
 export class EditorElement extends LitElement {
   static override styles = [
@@ -196,7 +197,11 @@ export class EditorElement extends LitElement {
     const service = new Service(this.base, { key: this.key ?? keys.kept, askForKey });
     const editor = new Editor(service);
     editor.addEventListener('change', () => this.requestUpdate());
-    editor.addEventListener('opened', () => this.emit('opened', { name: editor.scan?.name }));
+    editor.addEventListener('opened', () => {
+      // Of another scan all is seen: new cloth on the side of before would look as if it was missing.
+      this.change({ split: 0 });
+      this.emit('opened', { name: editor.scan?.name });
+    });
     for (const name of ['mended', 'edited']) {
       editor.addEventListener(name, () => {
         const { report, constraints } = editor.step;
@@ -284,7 +289,8 @@ export class EditorElement extends LitElement {
       </header>
       <main class=${this.dragging ? 'over' : ''}>
         <darn-stage .editor=${editor}></darn-stage>
-        ${scan === undefined && work === undefined ? this.welcome() : nothing} ${this.notices()} ${this.said()}
+        ${scan === undefined && work === undefined ? welcome(this.pick, this.openExample) : nothing} ${this.notices()}
+        ${this.said()}
       </main>
       <aside
         @darn-frame=${this.frame}
@@ -307,22 +313,6 @@ export class EditorElement extends LitElement {
         }
       </aside>
       <darn-key></darn-key>
-    `;
-  }
-
-  private welcome(): TemplateResult {
-    return html`
-      <div class="welcome">
-        <h2>Mend a scan of cloth</h2>
-        <p>
-          Drop a glTF file here: a GLB, or a glTF together with the files that it refers to. The service finds its holes
-          and fills them with cloth that continues the folds around them. The scan itself stays as it is.
-        </p>
-        <div class="row">
-          <button class="main" @click=${this.pick}>Open a scan</button>
-          <button id="example" @click=${this.openExample}>Try the example</button>
-        </div>
-      </div>
     `;
   }
 
@@ -436,11 +426,13 @@ export class EditorElement extends LitElement {
 
   private readonly frame = (event: CustomEvent<number>): void => this.stage?.viewer?.frame(event.detail);
 
-  private readonly look = (event: CustomEvent<Partial<Look>>): void => {
-    this.shown = { ...this.shown, ...event.detail };
-    this.stage?.viewer?.setLook(event.detail);
+  private readonly look = (event: CustomEvent<Partial<Look>>): void => this.change(event.detail);
+
+  private change(look: Partial<Look>): void {
+    this.shown = { ...this.shown, ...look };
+    this.stage?.viewer?.setLook(look);
     this.requestUpdate();
-  };
+  }
 
   private readonly keyDown = (event: KeyboardEvent): void => {
     if (!this.isMeant(event)) {

@@ -17,7 +17,7 @@ export class LookPanel extends Panel {
   static override properties = { shown: {} };
 
   /** What is drawn, as it was chosen here or elsewhere. */
-  declare shown: Pick<Look, 'tinted' | 'outlined'>;
+  declare shown: Pick<Look, 'tinted' | 'outlined' | 'split'>;
 
   protected override render(): TemplateResult {
     return html`
@@ -48,7 +48,7 @@ export class LookPanel extends Panel {
           min="0"
           max="1"
           step="0.01"
-          value="0"
+          .value=${String(this.shown.split)}
           @input=${(event: Event) => this.look({ split: Number((event.target as HTMLInputElement).value) })}
         />
       </label>
