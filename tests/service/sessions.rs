@@ -36,8 +36,8 @@ async fn a_session_is_opened_edited_and_ended() {
     let service = Service::start(&[]).await;
     let opened = service.open("cloth").send().await.unwrap();
     assert_eq!(opened.status(), 201);
-    let result = &opened.headers()["darn-result"];
-    assert_eq!(result, "filled=1 skipped=0 doubtful=0");
+    let outcome = &opened.headers()["darn-result"];
+    assert_eq!(outcome, "filled=1 skipped=0 doubtful=0");
     let path = opened.headers()["location"].to_str().unwrap().to_owned();
     let session: Value = opened.json().await.unwrap();
     assert_eq!(
@@ -84,8 +84,8 @@ async fn a_session_is_opened_edited_and_ended() {
     // The result has the constraints of the last successful edit.
     service.fake.next_edit(Behaviour::RefuseNotADisk);
     let refused = service.ask(&edit, edit_at(3.0)).send().await.unwrap();
-    let said = &refused.headers()["darn-result"];
-    assert_eq!(said, "filled=0 skipped=1 doubtful=0");
+    let outcome = &refused.headers()["darn-result"];
+    assert_eq!(outcome, "filled=0 skipped=1 doubtful=0");
     assert_eq!(code(refused).await, (422, "not_a_disk".to_owned()));
     let edited = service.get(&result).send().await.unwrap();
     assert_eq!(edited.text().await.unwrap(), "glTF cloth [0.75]");

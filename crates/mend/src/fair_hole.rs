@@ -21,7 +21,6 @@ use darn_geometry::mesh::sound_hole::SoundHole;
 use darn_geometry::patch::{FairPatch, Fairness, PatchWork, Untangling};
 
 /// Why a hole has no chart, or none that helps.
-#[derive(Default)]
 pub struct NoChart {
     /// Why, for a person.
     pub reason: String,
@@ -50,19 +49,19 @@ pub struct FairHole {
 }
 
 impl FairHole {
-    /// Closes the hole of a loop with a fair surface, from the edge of the cloth without the faces `left` where that is one line.
+    /// Closes the hole of a loop with a fair surface, from the edge of the cloth without the faces that are left, where that is one line.
     ///
     /// # Errors
     /// `Region` or `Patch`, whichever stage fails; `Exhausted`.
     pub fn new(
         welded: &WeldedScan,
         id: u32,
-        reason: NoChart,
+        no_chart: NoChart,
         untangling: Untangling,
         call: Call,
     ) -> Result<FairHole, MendError> {
         let (started, budget) = (Instant::now(), call.budget);
-        let NoChart { reason, left } = reason;
+        let NoChart { reason, left } = no_chart;
         let scanned = welded.bounded();
         let sound = SoundHole::without(&scanned, &welded.loops[id as usize], left, budget)?;
         let whole = match &sound {
