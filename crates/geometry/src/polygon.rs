@@ -26,6 +26,28 @@ pub fn extent(polygon: &[Vec2]) -> f64 {
     (high - low).max()
 }
 
+/// The corners of the convex hull of points, counter-clockwise (Andrew's monotone chain), the first once more at the end;
+/// points that are not finite are kept.
+pub fn convex_hull(points: &[Vec2]) -> Vec<Vec2> {
+    let mut sorted = points.to_vec();
+    sorted.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    let mut hull: Vec<Vec2> = Vec::new();
+    let mut chain = |points: &mut dyn Iterator<Item = &Vec2>| {
+        let first = hull.len();
+        for p in points {
+            while let [.., a, b] = hull[first..]
+                && (b - a).perp(&(p - b)) <= 0.0
+            {
+                hull.pop();
+            }
+            hull.push(*p);
+        }
+    };
+    chain(&mut sorted.iter());
+    chain(&mut sorted.iter().rev());
+    hull
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

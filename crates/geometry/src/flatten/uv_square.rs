@@ -1,6 +1,7 @@
 //! The unit square of uv laid over a chart: the smallest enclosing square over all rotations.
 
 use crate::mesh::Vec2;
+use crate::polygon::convex_hull;
 
 /// A square in the plane of a chart.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,27 +67,6 @@ impl UvSquare {
         let up = Vec2::new(-self.axis.y, self.axis.x);
         self.origin + (self.axis * uv.x + up * uv.y) * self.side
     }
-}
-
-/// The corners of the convex hull, counter-clockwise (Andrew's monotone chain); points that are not finite are kept.
-fn convex_hull(points: &[Vec2]) -> Vec<Vec2> {
-    let mut sorted = points.to_vec();
-    sorted.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    let mut hull: Vec<Vec2> = Vec::new();
-    let mut chain = |points: &mut dyn Iterator<Item = &Vec2>| {
-        let first = hull.len();
-        for p in points {
-            while let [.., a, b] = hull[first..]
-                && (b - a).perp(&(p - b)) <= 0.0
-            {
-                hull.pop();
-            }
-            hull.push(*p);
-        }
-    };
-    chain(&mut sorted.iter());
-    chain(&mut sorted.iter().rev());
-    hull
 }
 
 #[cfg(test)]

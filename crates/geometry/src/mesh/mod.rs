@@ -24,10 +24,13 @@ pub mod loops;
 pub mod membranes;
 pub mod nearest;
 pub mod openings;
+#[cfg(test)]
+mod openings_tests;
 mod pairing;
 mod piece;
 pub mod region;
 mod repair;
+mod rim_shape;
 pub mod shapes;
 pub mod skins;
 pub mod sound_hole;
