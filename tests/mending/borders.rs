@@ -6,7 +6,7 @@ use darn_budget::Budget;
 use darn_contract::port::HolesQuery;
 use darn_contract::{Border, Constraints, HoleSelector, TornEdge, v1};
 use darn_geometry::mesh::loops::LoopKind;
-use darn_geometry::mesh::shapes::sheet;
+use darn_geometry::mesh::shapes::{sheet, tube};
 use darn_geometry::mesh::weld::weld;
 use darn_geometry::mesh::{TriMesh, Vec3};
 use darn_mend::find_holes;
@@ -269,30 +269,167 @@ fn a_tear_that_cannot_be_joined_is_refused_at_its_place() {
     }
 }
 
+/// A bag with a round mouth at either end, without what `keep` leaves out.
+fn bag(keep: impl Fn(f64, f64) -> bool) -> TriMesh {
+    let mut mesh = Arc::unwrap_or_clone(weld(&tube(48, keep)).mesh);
+    for p in &mut mesh.positions {
+        let polar = 0.8 + (std::f64::consts::PI - 1.6) * p.z / 4.0;
+        *p = Vec3::new(p.x * polar.sin(), p.y * polar.sin(), -1.5 * polar.cos());
+    }
+    mesh
+}
+
 #[test]
-fn a_new_hem_that_leaves_the_scan_is_no_plausible_cloth() {
-    let corner = torn(|u, v| u + v > 0.3, 0.02);
-    let at = |u: f64, v: f64| [u, v, 0.02 * (9.0 * u).sin()];
-    let asked = |along: Vec<[f64; 3]>| {
+fn a_rip_from_an_opening_is_a_candidate_and_is_mended_not_the_opening() {
+    for depth in [0.15, 0.3] {
+        let ripped = bag(|u, v| (u - 0.5).abs() * 48.0 > 1.0 || v > depth);
+        let bytes = packed(&ripped, &[]);
+        let told = candidates(&bytes);
+        let [rip] = &told[..] else {
+            panic!("{depth}: {told:?}");
+        };
+        let error = mended(&bytes, &Constraints::default()).unwrap_err();
+        assert_eq!(error.code().word, "no_holes");
+        let border = rip.border.clone().expect("a border");
+        let [from, to] = [&border.from, &border.to].map(|p| [p[0], p[1], p[2]]);
+        let named = Border::Line {
+            from,
+            to,
+            along: Vec::new(),
+        };
+        for asked in [Border::Auto, named] {
+            let answer = mended(&bytes, &asking(asked)).unwrap();
+            let share = MendedScan::of(&answer.bytes).patch_area()
+                / (area(&bag(|_, _| true)) - area(&ripped));
+            assert!((0.8..1.2).contains(&share), "{depth}: {share}");
+        }
+    }
+}
+
+#[test]
+fn points_far_from_the_cloth_are_refused_with_distance_and_limit() {
+    let bytes = packed(
+        &torn(|u, v| bitten(u, v) && (u - 0.5).hypot(v - 0.6) > 0.1, 0.0),
+        &[],
+    );
+    let line = |from: [f64; 3], along: Vec<[f64; 3]>| {
         asking(Border::Line {
-            from: at(0.0, 0.3),
-            to: at(0.3, 0.0),
+            from,
+            to: [0.64, 0.0, 0.0],
             along,
         })
     };
-    let bytes = packed(&corner, &[]);
-    let sound = mended(&bytes, &asked(vec![at(0.0, 0.0)])).unwrap();
-    assert_eq!(sound.report.holes[0].doubts, Vec::<String>::new());
-    let far = asked(vec![[-5.0, -5.0, 3.0]]);
-    let refused = mended(&bytes, &far).unwrap_err();
-    assert_eq!(refused.code().word, "no_plausible_fill");
-    let accepted = Constraints {
-        accept_doubtful: true,
-        ..far
+    let near = |point: [f64; 3]| Constraints {
+        holes: vec![HoleSelector::Near(point)],
+        ..Constraints::default()
     };
-    let doubts = &mended(&bytes, &accepted).unwrap().report.holes[0].doubts;
+    let at_bite = [0.36, 0.0, 0.0];
+    for (asked, told) in [
+        (line([1e6, 0.0, 0.0], Vec::new()), "`from` lies 999999.0000"),
+        (
+            line(at_bite, vec![[0.5, 0.0, 0.0], [-5.0, -5.0, 3.0]]),
+            "`along/1` lies",
+        ),
+        (near([1e9, 0.0, 0.0]), "`near` lies"),
+    ] {
+        let error = mended(&bytes, &asked).unwrap_err();
+        let text = error.to_string();
+        assert!(
+            text.contains(told) && text.contains("diagonal, 1.41"),
+            "{text}"
+        );
+        assert!(error.fields()[0].pointer.starts_with("/holes/0"), "{error}");
+    }
+    // A click beside the cloth is none of these.
+    mended(&bytes, &near([0.5, -0.6, 0.5])).unwrap();
+    mended(&bytes, &line([0.36, -0.3, 0.2], Vec::new())).unwrap();
+}
+
+#[test]
+fn the_lips_of_one_rip_are_mended_as_the_rip() {
+    for depth in [0.3, 0.5, 0.8] {
+        let ripped = torn(|u, v| (u - 0.5).abs() > 0.035 || v > depth, 0.0);
+        let bytes = packed(&ripped, &[]);
+        for half in [0.04, 0.0] {
+            let (left, right) = (0.5 - half, 0.5 + half);
+            let tear = Border::Tear([
+                TornEdge {
+                    from: [0.46, 0.0, 0.0],
+                    to: [left, depth, 0.0],
+                },
+                TornEdge {
+                    from: [right, depth, 0.0],
+                    to: [0.54, 0.0, 0.0],
+                },
+            ]);
+            let answer = mended(&bytes, &asking(tear)).unwrap();
+            let share = share_mended(&answer.bytes, &ripped, 0.0);
+            assert!((0.9..1.1).contains(&share), "{depth} {half}: {share}");
+        }
+    }
+}
+
+#[test]
+fn a_tube_torn_in_two_is_refused_with_the_reason() {
+    let torn = Arc::unwrap_or_clone(weld(&tube(40, |_, v| (v - 0.5).abs() > 0.06)).mesh);
+    let edge = |z: f64| TornEdge {
+        from: [1.0, 0.0, z],
+        to: [-1.0, 0.0, z],
+    };
+    let tear = Border::Tear([edge(1.7), edge(2.3)]);
+    let error = mended(&packed(&torn, &[]), &asking(tear)).unwrap_err();
+    assert_eq!(error.fields()[0].pointer, "/holes/0/border");
+    assert!(error.to_string().contains("ends of tubes"), "{error}");
+}
+
+#[test]
+fn lips_longer_than_the_rest_of_the_edge_are_still_the_way_into_the_cloth() {
+    let tooth = |v: f64| 0.1 * f64::from((v * 48.0 / 3.0) as u32 % 2);
+    let keep = |u: f64, v: f64| {
+        let t = tooth(v);
+        !(0.3 + t..0.6 + t).contains(&u) || v > 0.8
+    };
+    for fold in [0.0, 0.03] {
+        let ripped = torn(keep, fold);
+        let bytes = packed(&ripped, &[]);
+        let line = Border::Line {
+            from: [0.3, 0.0, fold * (2.7_f64).sin()],
+            to: [0.6, 0.0, fold * (5.4_f64).sin()],
+            along: Vec::new(),
+        };
+        let answer = mended(&bytes, &asking(line)).unwrap();
+        let share = share_mended(&answer.bytes, &ripped, fold);
+        assert!((0.9..1.1).contains(&share), "fold {fold}: {share}");
+    }
+}
+
+#[test]
+fn stretches_that_overlap_are_told() {
+    let bytes = packed(&torn(bitten, 0.0), &[]);
+    let line = |half: f64| {
+        HoleSelector::Border(Border::Line {
+            from: [0.5 - half, 0.0, 0.0],
+            to: [0.5 + half, 0.0, 0.0],
+            along: Vec::new(),
+        })
+    };
+    let both = |holes| Constraints {
+        holes,
+        ..Constraints::default()
+    };
+    let error = mended(&bytes, &both(vec![line(0.15), line(0.2)])).unwrap_err();
+    assert_eq!(error.fields()[0].pointer, "/holes/1/border");
     assert!(
-        doubts.iter().any(|d| d.contains("the whole scan")),
-        "{doubts:?}"
+        error.to_string().contains("overlaps what /holes/0/border"),
+        "{error}"
+    );
+    // What is found is left where it is named, too, in whatever order.
+    let auto = HoleSelector::Border(Border::Auto);
+    let answer = mended(&bytes, &both(vec![auto, line(0.15)])).unwrap();
+    assert_eq!(answer.report.holes.len(), 1);
+    let notes = &answer.report.notes;
+    assert!(
+        notes.iter().any(|n| n.contains("a bite was left")),
+        "{notes:?}"
     );
 }

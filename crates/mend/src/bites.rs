@@ -16,17 +16,16 @@ const SAMPLES: usize = 512;
 /// Fewest vertices of a loop that is looked at.
 const LEAST_VERTICES: usize = 16;
 /// Longest stretch of a bite, as a share of its loop.
-const LONGEST: f64 = 0.35;
+const LONGEST: f64 = 0.55;
 /// Least ratio of a bite's stretch to its mouth.
 const LEAST_DETOUR: f64 = 1.2;
 /// Least depth of a bite, in mean edges of its loop.
 const LEAST_DEPTH: f64 = 3.0;
-/// How far the hem is looked at on each side of a bite, in lengths of its mouth.
-const HEM: f64 = 1.0;
+/// How far the hem is looked at on each side of a bite, in lengths of its mouth, and the largest angle between it and the mouth, radians: less hem
+/// has to be straighter.
+const HEMS: [(f64, f64); 2] = [(1.0, 0.45), (0.3, 0.2)];
 /// The least that it is looked at, as a share of the loop.
 const LEAST_HEM: f64 = 0.03;
-/// Largest angle between the hem on each side and the mouth, radians.
-const LARGEST_TURN: f64 = 0.45;
 /// Largest ratio of length to chord of the hem on each side.
 const LARGEST_WAVE: f64 = 1.1;
 /// Nanoseconds of work a pair of points.
@@ -69,7 +68,7 @@ pub fn bites(
     let line = FlatLine::of(mesh, topology, rim);
     let mut found: Vec<Bite> = Vec::new();
     for from in 0..line.samples.len() {
-        for ahead in 2..line.samples.len() / 2 {
+        for ahead in 2..line.samples.len() {
             steps.take(PAIR_WORK)?;
             let stretch = from..from + ahead;
             if line.length_of(&stretch) > LONGEST * line.length {
@@ -164,19 +163,21 @@ impl FlatLine {
             return None;
         }
         let along = chord / mouth;
+        let is_between_hems = HEMS.iter().any(|(share, turn)| {
+            let reach = (share * mouth).max(LEAST_HEM * self.length);
+            let straight = |hem: Option<Vec2>| hem.is_some_and(|hem| along.dot(&hem) > turn.cos());
+            straight(self.hem(from, -reach)) && straight(self.hem(to, reach))
+        });
+        if !is_between_hems {
+            return None;
+        }
         // The cloth lies on the left.
         let height = |s: usize| along.perp(&(self.places[self.sample(s)].0 - a));
         let heights = || stretch.clone().map(height);
         let depth = heights().fold(0.0, f64::max);
         let least = heights().fold(0.0, f64::min);
-        if depth < LEAST_DEPTH * self.edge || -least > 0.1 * depth {
-            return None;
-        }
-        let reach = (HEM * mouth).max(LEAST_HEM * self.length);
-        let before = self.hem(from, -reach)?;
-        let after = self.hem(to, reach)?;
-        let straight = |hem: Vec2| along.dot(&hem) > LARGEST_TURN.cos();
-        (straight(before) && straight(after)).then_some(Bite {
+        let is_deep = depth >= LEAST_DEPTH * self.edge && -least <= 0.1 * depth;
+        is_deep.then_some(Bite {
             from: from % self.vertices,
             to: to % self.vertices,
             length,
@@ -212,7 +213,7 @@ impl FlatLine {
 }
 
 /// The angle of the faces at a vertex, radians.
-fn inner_angle(mesh: &TriMesh, topology: &Topology, vertex: VertexId) -> f64 {
+pub fn inner_angle(mesh: &TriMesh, topology: &Topology, vertex: VertexId) -> f64 {
     let leaving = topology.leaving(vertex).into_iter();
     leaving
         .map(|h| mesh.corner_angle(h.face().index(), h.corner()))
@@ -268,9 +269,43 @@ mod tests {
     }
 
     #[test]
+    fn wide_bites_and_deep_ragged_rips_are_found() {
+        let wide = |width: f64, depth: f64| {
+            move |u: f64, v: f64| ((u - 0.5) / (0.5 * width)).hypot(v / depth) > 1.0
+        };
+        let saw = |depth: f64| {
+            move |u: f64, v: f64| {
+                let tooth = 0.02 * f64::from((v * 60.0) as u32 / 2 % 3);
+                (u - 0.5 - tooth).abs() > 0.03 || v > depth
+            }
+        };
+        for bites in [
+            found(wide(0.5, 0.2), 0.0),
+            found(wide(0.7, 0.3), 0.0),
+            found(saw(0.6), 0.0),
+            found(saw(0.8), 0.02),
+        ] {
+            let [(bite, from, to)] = &bites[..] else {
+                panic!("{bites:?}");
+            };
+            assert!(
+                bite.depth > 0.15 && from.y < 0.05 && to.y < 0.05,
+                "{bites:?}"
+            );
+        }
+    }
+
+    #[test]
     fn whole_cloth_and_cloth_cut_to_a_shape_has_none() {
         assert!(found(|_, _| true, 0.0).is_empty());
         assert!(found(|_, _| true, 0.04).is_empty());
+        // Scallops and a frayed hem.
+        let scallop = |u: f64, v: f64| v > 0.06 - 0.05 * (31.4 * u).cos();
+        assert!(found(scallop, 0.0).is_empty());
+        let frayed = |u: f64, v: f64| {
+            v > 0.04 || ((u * 60.0) as u32 * 7919 + (v * 60.0) as u32 * 104_729) % 5 < 3
+        };
+        assert!(found(frayed, 0.0).is_empty());
         // An L: a concave corner, the hems at a right angle.
         assert!(found(|u, v| u < 0.5 || v < 0.5, 0.0).is_empty());
         // A round piece.

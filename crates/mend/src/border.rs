@@ -8,17 +8,18 @@ use crate::bites::{Bite, bites};
 use crate::cut::{Pieces, edge_ends, renumbered};
 use crate::error::MendError;
 use crate::hem_strip::{HemEnd, HemVertices, NewHem, Way};
+use crate::stretch::{Places, Stretch, ahead, into_cloth};
 use crate::tears::tears;
 use crate::welded_scan::WeldedScan;
-use darn_budget::{Budget, Exhausted, Steps};
+use darn_budget::{Budget, Exhausted};
 use darn_contract::{Border, Constraints, FieldError, HoleSelector, TornEdge, v1};
 use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind};
 use darn_geometry::mesh::nearest::distance_to_segment;
 use darn_geometry::mesh::{TriMesh, Vec3};
 use darn_gltf_scan::Scan;
 
-/// Nanoseconds of work a vertex of the borders for a point that is looked for.
-const VERTEX_WORK: u64 = 10;
+/// A part of a loop between two torn edges is the end of a rip when it is at most this many times as long as its ends are apart.
+const END_OF_A_RIP: f64 = 2.0;
 
 /// The bites and tears at the cloth's own edge, as `POST /holes` lists them.
 ///
@@ -85,48 +86,14 @@ fn borders(welded: &WeldedScan) -> impl Iterator<Item = &BoundaryLoop> {
     (welded.loops.iter()).filter(|rim| rim.kind != LoopKind::Hole && !rim.vertices.is_empty())
 }
 
-/// A stretch of a loop.
-#[derive(Clone, Copy)]
-struct Stretch<'a> {
-    rim: &'a BoundaryLoop,
-    /// Its first vertex in the loop.
-    from: usize,
-    /// How many edges it has.
-    edges: usize,
-}
-
-impl<'a> Stretch<'a> {
-    fn to(&self) -> usize {
-        (self.from + self.edges) % self.rim.vertices.len()
-    }
-
-    /// The loop's vertices that it lies between and at.
-    fn vertices(&self) -> impl Iterator<Item = usize> {
-        let n = self.rim.vertices.len();
-        (self.from..=self.from + self.edges).map(move |k| k % n)
-    }
-
-    /// The places of these vertices, scene space.
-    fn places(&self, whole: &WeldedScan) -> impl Iterator<Item = Vec3> {
-        let places = self.from..=self.from + self.edges;
-        places.map(|k| whole.rim_position(self.rim, k))
-    }
-
-    fn overlaps(&self, other: &Stretch) -> bool {
-        let n = self.rim.vertices.len();
-        let within = |s: &Stretch, vertex: usize| (vertex + n - s.from) % n <= s.edges;
-        self.rim.id == other.rim.id && (within(self, other.from) || within(other, self.from))
-    }
-
-    /// The hems that leave its first and its last vertex, of this many edges.
-    fn hems(&self, edges: usize) -> [HemEnd<'a>; 2] {
-        [(self.from, Way::Back), (self.to(), Way::On)].map(|(vertex, way)| HemEnd {
-            rim: self.rim,
-            vertex,
-            way,
-            edges,
-        })
-    }
+/// The hems that leave the first and the last vertex of a stretch, of this many edges.
+fn hems_of<'a>(stretch: &Stretch<'a>, edges: usize) -> [HemEnd<'a>; 2] {
+    [(stretch.from, Way::Back), (stretch.to(), Way::On)].map(|(vertex, way)| HemEnd {
+        rim: stretch.rim,
+        vertex,
+        way,
+        edges,
+    })
 }
 
 /// What is closed to one hole.
@@ -150,7 +117,7 @@ impl<'a> Closing<'a> {
         let rest = |stretch: &Stretch| stretch.rim.vertices.len() - stretch.edges;
         let [first, second] = match self {
             Closing::Stretch(stretch, along) => {
-                let [before, after] = stretch.hems(rest(stretch));
+                let [before, after] = hems_of(stretch, rest(stretch));
                 return vec![NewHem {
                     before,
                     after,
@@ -168,8 +135,8 @@ impl<'a> Closing<'a> {
             )),
             false => rest(stretch),
         };
-        let [before, after] = first.hems(room(first));
-        let [other_before, other_after] = second.hems(room(second));
+        let [before, after] = hems_of(first, room(first));
+        let [other_before, other_after] = hems_of(second, room(second));
         let far = |a: &HemEnd, b: &HemEnd| (a.place(whole, 0) - b.place(whole, 0)).norm();
         // A loop has the cloth on its left. Where both pieces show the same side, one loop runs along the gap against the other.
         let same_side = far(&before, &other_after) + far(&other_before, &after);
@@ -238,13 +205,30 @@ pub fn closed(
         budget.hold(scan.surface.positions.len() * 24 + scan.surface.faces.len() * 12)?;
         surface = scan.surface.clone();
     }
+    // What is named by its ends goes before what is found.
+    let is_found =
+        |entry: usize| matches!(constraints.holes[entry], HoleSelector::Border(Border::Auto));
+    closings.sort_by_key(|(entry, _)| is_found(*entry));
     let mut used = HemVertices::default();
+    let mut taken: Vec<(usize, Stretch)> = Vec::new();
+    let mut notes = Vec::new();
     for (entry, closing) in closings {
-        let mut stretches = closing.stretches().iter();
-        if stretches.any(|s| s.vertices().any(|v| used.has(s.rim, v))) {
-            // The same bite, named once more.
+        let stretches = closing.stretches();
+        let touches = |other: &Stretch| stretches.iter().any(|own| own.overlaps(other));
+        let other = taken.iter().find(|(_, other)| touches(other));
+        let on_hem = stretches
+            .iter()
+            .any(|s| s.vertices().any(|v| used.has(s.rim, v)));
+        if let Some(detail) = overlap(other.map(|(entry, _)| *entry), on_hem) {
+            match is_found(entry) {
+                true => notes.push(format!(
+                    "/holes/{entry}/border: a bite was left; it {detail}"
+                )),
+                false => wrong.push(border_error(entry, detail)),
+            }
             continue;
         }
+        taken.extend(stretches.iter().map(|s| (entry, *s)));
         let hems = closing.hems(&whole).into_iter();
         let lines = hems.map(|hem| hem.add_strip(&whole, &mut used, &mut surface));
         match lines.collect::<Result<Vec<_>, String>>() {
@@ -262,7 +246,21 @@ pub fn closed(
     if closed.is_empty() {
         return Ok(whole);
     }
-    with_strips(scan, whole, &surface, &closed, budget)
+    let mut welded = with_strips(scan, whole, &surface, &closed, budget)?;
+    welded.cuts.notes.extend(notes);
+    Ok(welded)
+}
+
+/// Why what an entry names is not closed once more.
+fn overlap(other: Option<usize>, on_hem: bool) -> Option<String> {
+    match (other, on_hem) {
+        (Some(other), _) => Some(format!("overlaps what /holes/{other}/border closes")),
+        (None, true) => Some(
+            "starts on the hem that another new hem is joined to; mend it in a request of its own"
+                .to_owned(),
+        ),
+        (None, false) => None,
+    }
 }
 
 fn border_error(entry: usize, detail: impl Into<String>) -> FieldError {
@@ -317,6 +315,7 @@ fn closings_of<'a>(
     border: &Border,
     budget: &Budget,
 ) -> Result<Result<Vec<Closing<'a>>, String>, Exhausted> {
+    let places = Places::of(whole);
     let (ends, along) = match border {
         Border::Auto => {
             let found = all_bites(whole, budget)?.into_iter();
@@ -345,93 +344,76 @@ fn closings_of<'a>(
                         .map(|p| distance_to_segment(&p, &from, &to));
                     places.sum::<f64>() / (stretch.edges + 1) as f64
                 };
-                stretch_between(whole, ends(own), &away, budget)
+                let ways = places.ways(&ends(own), budget)?;
+                Ok::<_, Exhausted>(
+                    ways.map(|[on, back]| if away(&on) <= away(&back) { on } else { back }),
+                )
             };
             let (first, second) = (named(first, second)?, named(second, first)?);
             return Ok(first.and_then(|first| {
                 let second = second.map_err(|detail| format!("in `facing`, {detail}"))?;
-                let edges = [first.stretch, second.stretch];
-                match edges[0].overlaps(&edges[1]) {
-                    true => Err("`facing` names an edge that overlaps the stretch".to_owned()),
-                    false => Ok(vec![Closing::Tear(edges)]),
-                }
+                Ok(vec![torn(whole, [first, second])?])
             }));
         }
         Border::Line { from, to, along } => ([*from, *to].map(Vec3::from), along),
     };
-    let length = |stretch: &Stretch| -> f64 {
-        let places: Vec<Vec3> = stretch.places(whole).collect();
-        places
-            .windows(2)
-            .map(|ends| (ends[1] - ends[0]).norm())
-            .sum()
+    let ways = match places.ways(&ends, budget)? {
+        Ok(ways) => ways,
+        Err(detail) => return Ok(Err(detail)),
     };
-    let stretch = stretch_between(whole, ends, &length, budget)?;
-    Ok(stretch.map(|named| {
-        let mut along: Vec<Vec3> = along.iter().map(|p| Vec3::from(*p)).collect();
-        if named.runs_back {
-            along.reverse();
+    let runs_on = into_cloth(whole, &ways, budget)?;
+    let [on, back] = ways;
+    let stretch = if runs_on { on } else { back };
+    let mut along: Vec<Vec3> = along.iter().map(|p| Vec3::from(*p)).collect();
+    for (k, point) in along.iter().enumerate() {
+        let distances = stretch.places(whole).map(|p| (p - point).norm());
+        let nearest = distances.fold(f64::INFINITY, f64::min);
+        if let Err(detail) = places.within_limit(&format!("along/{k}"), nearest) {
+            return Ok(Err(detail));
         }
-        vec![Closing::Stretch(named.stretch, along)]
-    }))
-}
-
-/// A way along a loop between two points.
-struct NamedStretch<'a> {
-    stretch: Stretch<'a>,
-    /// Whether it starts at the second point.
-    runs_back: bool,
-}
-
-/// The stretch of the cloth's own edge between the places nearest to two points, of the two ways the one with the smaller `cost`; or why there
-/// is none.
-fn stretch_between<'a>(
-    whole: &'a WeldedScan,
-    [from, to]: [Vec3; 2],
-    cost: &dyn Fn(&Stretch) -> f64,
-    budget: &Budget,
-) -> Result<Result<NamedStretch<'a>, String>, Exhausted> {
-    let mut steps = Steps::of(budget);
-    type Nearest<'r> = Option<(f64, &'r BoundaryLoop, usize)>;
-    let mut nearest = |point: &Vec3, rims: &[&'a BoundaryLoop]| -> Result<Nearest<'a>, Exhausted> {
-        let mut best: Nearest<'a> = None;
-        for rim in rims {
-            steps.take(VERTEX_WORK * rim.vertices.len() as u64)?;
-            for k in 0..rim.vertices.len() {
-                let distance = (whole.rim_position(rim, k) - point).norm();
-                if best.is_none_or(|(least, ..)| distance < least) {
-                    best = Some((distance, *rim, k));
-                }
-            }
-        }
-        Ok(best)
-    };
-    let rims: Vec<&BoundaryLoop> = borders(whole).collect();
-    let Some((_, rim, start)) = nearest(&from, &rims)? else {
-        return Ok(Err("the scan's cloth has no edge of its own".to_owned()));
-    };
-    let Some((_, _, end)) = nearest(&to, &[rim])? else {
-        return Ok(Err("the scan's cloth has no edge of its own".to_owned()));
-    };
-    if start == end {
-        let detail = "`from` and `to` are nearest to the same vertex of the cloth's edge";
-        return Ok(Err(detail.to_owned()));
     }
-    let way = |from: usize, to: usize| Stretch {
-        rim,
-        from,
-        edges: ahead(rim, from, to),
-    };
-    let (on, back) = (way(start, end), way(end, start));
-    let runs_back = cost(&on) > cost(&back);
-    Ok(Ok(NamedStretch {
-        stretch: if runs_back { back } else { on },
-        runs_back,
-    }))
+    if !runs_on {
+        along.reverse();
+    }
+    Ok(Ok(vec![Closing::Stretch(stretch, along)]))
 }
 
-/// Edges of a loop from one vertex on to another.
-fn ahead(rim: &BoundaryLoop, from: usize, to: usize) -> usize {
-    let n = rim.vertices.len();
-    (to + n - from) % n
+/// What closes the gap between two torn edges; or why nothing does.
+fn torn<'a>(whole: &WeldedScan, edges: [Stretch<'a>; 2]) -> Result<Closing<'a>, String> {
+    let [first, second] = &edges;
+    if first.rim.id != second.rim.id {
+        let goes_round = |s: &Stretch| matches!(s.rim.kind, LoopKind::TubeEnd | LoopKind::Opening);
+        return match goes_round(first) && goes_round(second) {
+            true => Err(format!(
+                "loops {} and {} are ends of tubes: the gap between them runs all the way round and has no end where a new hem could start; \
+                 tubes that are torn in two are not joined",
+                first.rim.id, second.rim.id
+            )),
+            false => Ok(Closing::Tear(edges)),
+        };
+    }
+    // The lips of one rip: what lies between them on the cloth's edge is the rip's end.
+    let between = |from: &Stretch<'a>, to: &Stretch<'a>| {
+        let end = Stretch {
+            rim: from.rim,
+            from: from.to(),
+            edges: ahead(from.rim, from.to(), to.from),
+        };
+        let ends = [end.from, end.to()].map(|k| whole.rim_position(end.rim, k));
+        let is_short = end.length(whole) <= END_OF_A_RIP * (ends[1] - ends[0]).norm();
+        let rip = Stretch {
+            rim: from.rim,
+            from: from.from,
+            edges: from.edges + end.edges + to.edges,
+        };
+        let is_rip = is_short && rip.edges < rip.rim.vertices.len() && rip.is_bite(whole);
+        is_rip.then_some(rip)
+    };
+    match between(first, second).or_else(|| between(second, first)) {
+        Some(rip) => Ok(Closing::Stretch(rip, Vec::new())),
+        None if first.overlaps(second) => {
+            Err("`facing` names an edge that overlaps the stretch".to_owned())
+        }
+        None => Ok(Closing::Tear(edges)),
+    }
 }

@@ -64,6 +64,7 @@ mod separate;
 mod session;
 mod session_description;
 mod sorted;
+mod stretch;
 mod strip;
 mod suspects;
 mod tears;

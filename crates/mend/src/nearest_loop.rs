@@ -11,6 +11,8 @@ pub struct NearestLoop<'a> {
     welded: &'a WeldedScan,
     /// The loops with the balls around them; made when the first point is looked for.
     balls: Option<Vec<RimBall<'a>>>,
+    /// A point must not lie farther from a loop: the scan's diagonal, scene units.
+    limit: Option<f64>,
     steps: Steps<'a>,
 }
 
@@ -32,11 +34,12 @@ impl<'a> NearestLoop<'a> {
         NearestLoop {
             welded,
             balls: None,
+            limit: None,
             steps: Steps::of(budget),
         }
     }
 
-    /// The loop nearest to a point, the first of several, or why there is none.
+    /// The loop nearest to a point, the first of several; or why there is none: without loops, or farther than the scan's diagonal away.
     ///
     /// # Errors
     /// `Exhausted`: a request may have thousands of points, a scan hundreds of thousands of loops.
@@ -63,10 +66,30 @@ impl<'a> NearestLoop<'a> {
                 best = Some((distance, ball.rim));
             }
         }
-        Ok(best
-            .map(|(_, rim)| rim)
-            .ok_or_else(|| "the scan has no boundary loop".to_owned()))
+        let Some((distance, rim)) = best else {
+            return Ok(Err("the scan has no boundary loop".to_owned()));
+        };
+        let limit = *self.limit.get_or_insert_with(|| diagonal(mesh));
+        Ok(match distance <= limit {
+            true => Ok(rim),
+            false => Err(format!(
+                "`near` lies {distance:.4} from the nearest loop; the limit is the scan's diagonal, {limit:.4}"
+            )),
+        })
     }
+}
+
+/// Diagonal of the box around a mesh, scene units: nobody who points at a place on a scan is farther off. Takes time in the order of the vertices.
+pub fn diagonal(mesh: &TriMesh) -> f64 {
+    let low = mesh
+        .positions
+        .iter()
+        .fold(Vec3::repeat(f64::MAX), |m, p| m.inf(p));
+    let high = mesh
+        .positions
+        .iter()
+        .fold(Vec3::repeat(f64::MIN), |m, p| m.sup(p));
+    (high - low).norm()
 }
 
 impl<'a> RimBall<'a> {
