@@ -44,8 +44,8 @@ pub fn run(args: &HolesArgs) -> Result<(), Failure> {
 
 fn table(report: &HolesReport) -> String {
     let mut text = format!(
-        "{:>4}  {:<14} {:>9} {:>12} {:>9}  centroid\n",
-        "id", "kind", "vertices", "length", "turning"
+        "{:>4}  {:<14} {:>10} {:>9} {:>12} {:>12} {:>9}  centroid\n",
+        "id", "kind", "confidence", "vertices", "length", "diameter", "turning"
     );
     for rim in &report.loops {
         text.push_str(&line(rim));
@@ -76,11 +76,13 @@ pub fn set_aside(kinds: &[SetAside]) -> String {
 fn line(rim: &Loop) -> String {
     let centroid: Vec<String> = rim.centroid.iter().map(|c| format!("{c:.4}")).collect();
     format!(
-        "{:>4}  {:<14} {:>9} {:>12.4} {:>9.2}  {}\n",
+        "{:>4}  {:<14} {:>10.2} {:>9} {:>12.4} {:>12.4} {:>9.2}  {}\n",
         rim.id,
         kind_name(rim.kind()),
+        rim.confidence,
         rim.vertices,
         rim.length,
+        rim.diameter,
         rim.turning,
         centroid.join(" ")
     )
@@ -132,6 +134,8 @@ mod tests {
             kind: LoopKind::Hole.into(),
             vertices: 12,
             length: 3.25,
+            diameter: 1.125,
+            confidence: 0.87,
             centroid: vec![0.0, 1.0, 2.0],
             ..Loop::default()
         };
@@ -142,8 +146,9 @@ mod tests {
         };
         let text = table(&report);
         assert_eq!(text.lines().count(), 3);
-        assert!(
-            text.contains("hole") && text.contains("3.2500") && text.ends_with("note: a bow-tie\n")
-        );
+        for shown in ["hole", "3.2500", "1.1250", "0.87"] {
+            assert!(text.contains(shown), "{shown}: {text}");
+        }
+        assert!(text.ends_with("note: a bow-tie\n"));
     }
 }
