@@ -9,9 +9,9 @@ use crate::hole_report::patch_report;
 use crate::prepared_hole::HoleRef;
 use crate::welded_scan::WeldedScan;
 use darn_contract::v1;
+use darn_geometry::mesh::Vec3;
 use darn_geometry::mesh::curvature::face_areas;
 use darn_geometry::mesh::region::Region;
-use darn_geometry::mesh::{Vec3, diagonal};
 use darn_geometry::patch::Patch;
 use darn_geometry::patch::quality;
 
@@ -48,8 +48,6 @@ const MOST_UNSURE: f64 = 0.5;
 /// Area of a patch over that of the piece that it mends, from which on nothing is known of such patches: evaluation covers holes of up to 85 % of the
 /// side of a square sheet.
 const MOST_OF_PIECE: f64 = 2.6;
-/// Diagonal of a patch's box over that of the scan's from which on it is absurd.
-const MOST_ACROSS: f64 = 1.5;
 /// Patches of fewer inner vertices are never crumpled.
 const FEW_VERTICES: usize = 30;
 
@@ -221,13 +219,6 @@ impl HoleRef<'_> {
                     area / piece.max(f64::MIN_POSITIVE)
                 ));
             }
-        }
-        let across = diagonal(&patch.positions);
-        if across > MOST_ACROSS * welded.across {
-            reasons.push(format!(
-                "it is {:.1} times as large across as the whole scan (limit {MOST_ACROSS})",
-                across / welded.across.max(f64::MIN_POSITIVE)
-            ));
         }
         reasons
     }

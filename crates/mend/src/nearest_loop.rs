@@ -4,7 +4,7 @@ use crate::welded_scan::WeldedScan;
 use darn_budget::{Budget, Exhausted, Steps};
 use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind};
 use darn_geometry::mesh::nearest::distance_to_loop;
-use darn_geometry::mesh::{TriMesh, Vec3};
+use darn_geometry::mesh::{TriMesh, Vec3, diagonal};
 
 /// Finds the loop that is nearest to a point; an outer boundary only in a scan that has no other loops.
 pub struct NearestLoop<'a> {
@@ -69,7 +69,7 @@ impl<'a> NearestLoop<'a> {
         let Some((distance, rim)) = best else {
             return Ok(Err("the scan has no boundary loop".to_owned()));
         };
-        let limit = *self.limit.get_or_insert_with(|| diagonal(mesh));
+        let limit = *self.limit.get_or_insert_with(|| diagonal(&mesh.positions));
         Ok(match distance <= limit {
             true => Ok(rim),
             false => Err(format!(
@@ -77,19 +77,6 @@ impl<'a> NearestLoop<'a> {
             )),
         })
     }
-}
-
-/// Diagonal of the box around a mesh, scene units: nobody who points at a place on a scan is farther off. Takes time in the order of the vertices.
-pub fn diagonal(mesh: &TriMesh) -> f64 {
-    let low = mesh
-        .positions
-        .iter()
-        .fold(Vec3::repeat(f64::MAX), |m, p| m.inf(p));
-    let high = mesh
-        .positions
-        .iter()
-        .fold(Vec3::repeat(f64::MIN), |m, p| m.sup(p));
-    (high - low).norm()
 }
 
 impl<'a> RimBall<'a> {

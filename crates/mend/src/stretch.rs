@@ -3,11 +3,10 @@
 use std::f64::consts::PI;
 
 use crate::bites::inner_angle;
-use crate::nearest_loop::diagonal;
 use crate::welded_scan::WeldedScan;
 use darn_budget::{Budget, Exhausted, Steps};
-use darn_geometry::mesh::Vec3;
 use darn_geometry::mesh::loops::BoundaryLoop;
+use darn_geometry::mesh::{Vec3, diagonal};
 
 /// Nanoseconds of work a vertex of the loops for two points that are looked for.
 const VERTEX_WORK: u64 = 20;
@@ -119,7 +118,7 @@ impl<'a> Places<'a> {
     pub fn of(whole: &'a WeldedScan) -> Places<'a> {
         Places {
             whole,
-            limit: diagonal(&whole.surface.mesh),
+            limit: diagonal(&whole.surface.mesh.positions),
         }
     }
 

@@ -16,7 +16,7 @@ use darn_geometry::mesh::region::BoundedMesh;
 use darn_geometry::mesh::skins::{SecondSkin, on_patches, second_skins};
 use darn_geometry::mesh::topology::Topology;
 use darn_geometry::mesh::weld::{WeldedMesh, weld_within};
-use darn_geometry::mesh::{TriMesh, Vec3, diagonal};
+use darn_geometry::mesh::{TriMesh, Vec3};
 use darn_gltf_scan::Scan;
 
 /// The welded surface of a scan and its loops.
@@ -31,8 +31,6 @@ pub struct WeldedScan {
     pub loops: Vec<BoundaryLoop>,
     /// Per loop whether it is a hole of a second skin, which is not filled again.
     pub second_skins: Vec<Option<SecondSkin>>,
-    /// Diagonal of the box of the scan's own surface, scene units.
-    pub across: f64,
     /// What the request's cuts did.
     pub cuts: CutLoops,
     /// Milliseconds of welding and of finding the loops.
@@ -90,7 +88,6 @@ impl WeldedScan {
             topology,
             loops: Vec::new(),
             second_skins: Vec::new(),
-            across: diagonal(&scan.surface.positions),
             cuts: CutLoops::default(),
             timings: v1::ScanTimings::default(),
         };

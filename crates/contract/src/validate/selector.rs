@@ -21,7 +21,7 @@ pub enum HoleSelector {
 pub enum Border {
     /// Every bite and rip that is found.
     Auto,
-    /// The shorter way along the edge from one place to another.
+    /// The way into the cloth along the edge from one place to another.
     Line {
         /// Near where it starts.
         from: [f64; 3],

@@ -1,11 +1,13 @@
 //! Laws of how openings are told from holes.
 
 use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
 
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use super::index::FaceId;
 use super::loops::{BoundaryLoop, LoopKind, boundary_loops};
 use super::openings::{PRIOR, SUREST};
 use super::pairing::Paired;
@@ -53,7 +55,7 @@ fn bag(n: usize, mouth: f64, worn: impl Fn(f64, f64) -> bool) -> TriMesh {
 
 /// Without half of the triangles at the boundary, as reconstructions trim it; in one piece.
 fn trimmed(soup: &TriMesh, seed: u64) -> TriMesh {
-    let mut mesh = weld(soup).mesh;
+    let mut mesh = Arc::unwrap_or_clone(weld(soup).mesh);
     let boundary = Topology::new(&mesh).boundary_vertices();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     mesh.faces.retain(|f| {
@@ -63,21 +65,18 @@ fn trimmed(soup: &TriMesh, seed: u64) -> TriMesh {
     // What hangs on by a corner alone is no part of it.
     let topology = Topology::new(&mesh);
     let mut faces = vec![0usize; topology.components];
-    topology
-        .component
-        .iter()
-        .for_each(|c| faces[*c as usize] += 1);
+    let piece = |f: usize| topology.component(FaceId(f as u32));
+    (0..mesh.faces.len()).for_each(|f| faces[piece(f) as usize] += 1);
     let largest = (0..faces.len()).max_by_key(|c| faces[*c]).expect("a piece") as u32;
-    let kept = mesh.faces.iter().zip(topology.component.iter());
-    let kept = kept.filter(|(_, c)| **c == largest).map(|(f, _)| *f);
-    mesh.faces = kept.collect();
+    let kept = (0..mesh.faces.len()).filter(|f| piece(*f) == largest);
+    mesh.faces = kept.map(|f| mesh.faces[f]).collect();
     mesh
 }
 
 /// Every vertex moved to the middle of its neighbours, at the boundary of its neighbours along it, `rounds` times: as meshes are smoothed
 /// before they are handed on.
 fn smoothed(soup: &TriMesh, rounds: usize) -> TriMesh {
-    let mut mesh = weld(soup).mesh;
+    let mut mesh = Arc::unwrap_or_clone(weld(soup).mesh);
     let topology = Topology::new(&mesh);
     let boundary = topology.boundary_vertices();
     for _ in 0..rounds {
