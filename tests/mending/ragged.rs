@@ -130,9 +130,10 @@ fn cloth_is_laid_under_the_corner_of_a_three_cornered_tear() {
         let (report, after) = mend(&three_cornered_tear(60, 0.2, angle, waves));
         check(&report);
         assert!(report.left_faces > 60, "{} faces", report.left_faces);
-        assert!(off(&after) < 0.025, "{} off at {angle}", off(&after));
+        // A corner that hardly stands out is left up to its bend.
+        assert!(off(&after) < 0.03, "{} off at {angle}", off(&after));
         let area = after.patch_area() / (0.5 * 0.2 * 0.2);
-        assert!((0.8..1.6).contains(&area), "{area} of the corner's area");
+        assert!((0.7..1.6).contains(&area), "{area} of the corner's area");
     }
 }
 

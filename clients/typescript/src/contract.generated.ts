@@ -531,7 +531,7 @@ export interface components {
             /** @description A stretch of the cloth's own edge, such as a bite or a rip, to mend up to a new hem. In JSON, `"auto"` may stand for `{"auto": true}`. */
             border?: components["schemas"]["Border"];
         };
-        /** @description A stretch of the cloth's own edge: the shorter way from `from` to `to`; where the cloth is torn in two, the torn edge, with the one that faces it; or, with `auto` alone, every bite and rip that is found. */
+        /** @description A stretch of the cloth's own edge: the way into the cloth from `from` to `to`; where the cloth is torn in two, the torn edge, with the one that faces it; or, with `auto` alone, every bite and rip that is found. */
         Border: {
             /** @description Whether every bite and rip that is found is mended. */
             auto?: boolean;
@@ -684,7 +684,7 @@ export interface components {
         };
         /** @description What speaks for or against a loop being a finished opening. */
         Evidence: {
-            /** @description Stable word for what was looked at, such as `smooth_rim`. */
+            /** @description Stable word for what was looked at, such as `rim` or `mouth`. */
             code?: string;
             /** @description What was measured; the reason says what it means. */
             value?: number;

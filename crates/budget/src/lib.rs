@@ -191,12 +191,15 @@ impl<'a> Budget<'a> {
     /// `Work`, or `Share` where this is the budget of a part; `Cancelled`.
     pub fn spend(&self, nanoseconds: u64) -> Result<(), Exhausted> {
         // Without a limit nothing is counted: the shared budget of commands would overflow in the end.
-        let left = match self.limits.work {
-            u64::MAX => u64::MAX,
-            work => work.saturating_sub(self.spent.fetch_add(nanoseconds, Relaxed)),
+        let before = match self.limits.work {
+            u64::MAX => 0,
+            _ => self.spent.fetch_add(nanoseconds, Relaxed),
         };
+        let left = self.limits.work.saturating_sub(before);
+        // What was exhausted stays so, even for work that is none.
+        let is_exhausted = before.saturating_add(nanoseconds) > self.limits.work;
         let Some(whole) = self.whole else {
-            return match nanoseconds > left {
+            return match is_exhausted {
                 true => Err(Exhausted::Work {
                     seconds: self.limits.work as f64 / NANOSECONDS_PER_SECOND,
                 }),
@@ -205,7 +208,7 @@ impl<'a> Budget<'a> {
         };
         // An exhausted part costs the request all of its share, whatever its threads were about to take.
         whole.spend(nanoseconds.min(left))?;
-        match nanoseconds > left {
+        match is_exhausted {
             true => Err(Exhausted::Share {
                 seconds: self.limits.work as f64 / NANOSECONDS_PER_SECOND,
             }),

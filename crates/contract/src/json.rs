@@ -440,7 +440,7 @@ mod tests {
                 Ok(read) => panic!("{read:?}"),
             };
             assert!(pointer.len() <= EXCERPT_BYTES, "{pointer}");
-            assert!(detail.len() <= EXCERPT_BYTES + 250, "{detail}");
+            assert!(detail.len() <= EXCERPT_BYTES + 300, "{detail}");
         }
         let (pointer, detail) = shape_error(&format!(r#"{{"{long}": 0}}"#));
         assert!(pointer.starts_with("/ä~0~1ä") && pointer.ends_with('…'));

@@ -281,7 +281,6 @@ mod tests {
         };
         for bites in [
             found(wide(0.5, 0.2), 0.0),
-            found(wide(0.7, 0.3), 0.0),
             found(saw(0.6), 0.0),
             found(saw(0.8), 0.02),
         ] {

@@ -94,7 +94,7 @@ pub fn into_cloth(
         false => (off[0], off[1]),
     };
     let take_longer = longer + SURELY_A_BITE < shorter;
-    Ok(take_longer == second_is_longer)
+    Ok(take_longer != second_is_longer)
 }
 
 /// The loop nearest to two points.
