@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use darn_budget::{Budget, Exhausted, Steps};
 
-use darn_geometry::mesh::index::VertexId;
+use darn_geometry::mesh::curvature::inner_angle;
 use darn_geometry::mesh::loops::BoundaryLoop;
 use darn_geometry::mesh::topology::Topology;
 use darn_geometry::mesh::{TriMesh, Vec2};
@@ -210,14 +210,6 @@ impl FlatLine {
         };
         within(a, b.from) || within(a, b.to) || within(b, a.from)
     }
-}
-
-/// The angle of the faces at a vertex, radians.
-pub fn inner_angle(mesh: &TriMesh, topology: &Topology, vertex: VertexId) -> f64 {
-    let leaving = topology.leaving(vertex).into_iter();
-    leaving
-        .map(|h| mesh.corner_angle(h.face().index(), h.corner()))
-        .sum()
 }
 
 #[cfg(test)]

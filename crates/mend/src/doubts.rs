@@ -137,11 +137,13 @@ fn folded_over(patch: &Patch, region: &Region) -> f64 {
         (b - a).cross(&(c - a)).try_normalize(f64::MIN_POSITIVE)
     };
     let sides = |f: &[u32; 3]| [(f[0], f[1]), (f[1], f[2]), (f[2], f[0])];
+    let mut at_rim = vec![false; region.mesh.positions.len()];
+    patch.rim.iter().for_each(|v| at_rim[*v as usize] = true);
     let mut cloth: HashMap<(u32, u32), &[u32; 3]> = HashMap::new();
     for face in &region.mesh.faces {
-        sides(face).into_iter().for_each(|side| {
-            cloth.insert(side, face);
-        });
+        let of_rim = sides(face).into_iter();
+        let of_rim = of_rim.filter(|(a, b)| at_rim[*a as usize] && at_rim[*b as usize]);
+        cloth.extend(of_rim.map(|side| (side, face)));
     }
     let (mut folded, mut length) = (0.0, 0.0);
     for face in &patch.faces {

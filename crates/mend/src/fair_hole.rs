@@ -16,7 +16,7 @@ use darn_contract::{FieldError, v1};
 use darn_geometry::mesh::denoise::denoise;
 use darn_geometry::mesh::index::{FaceId, LoopId};
 use darn_geometry::mesh::layers::Layers;
-use darn_geometry::mesh::region::{self, BoundedMesh, Region};
+use darn_geometry::mesh::region::{self, Region};
 use darn_geometry::mesh::sound_hole::SoundHole;
 use darn_geometry::patch::{FairPatch, Fairness, PatchWork, Untangling};
 
@@ -64,14 +64,7 @@ impl FairHole {
         let NoChart { reason, left } = no_chart;
         let scanned = welded.bounded();
         let sound = SoundHole::without(&scanned, &welded.loops[id as usize], left, budget)?;
-        let whole = match &sound {
-            None => scanned,
-            Some(sound) => BoundedMesh {
-                topology: &sound.topology,
-                loops: &sound.loops,
-                ..scanned
-            },
-        };
+        let whole = (sound.as_ref()).map_or(scanned, |sound| sound.bounded(scanned));
         let left = sound.as_ref().map_or(&[][..], |sound| &sound.left);
         let region =
             region::collar(&whole, LoopId(id), 0.0, budget).map_err(MendError::region(id))?;

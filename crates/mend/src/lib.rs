@@ -50,6 +50,7 @@ mod near_seams;
 mod nearest_loop;
 mod network_share;
 mod picture;
+mod point_limit;
 mod port;
 mod prepare;
 mod prepared_hole;

@@ -5,6 +5,7 @@ use rstar::primitives::GeomWithData;
 use rstar::{PointDistance as _, RTree};
 
 use crate::prepared_hole::HoleRef;
+use crate::scan_notes::first_of;
 use crate::welded_scan::WeldedScan;
 use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind};
 use darn_geometry::patch::Patch;
@@ -138,13 +139,5 @@ impl NearPatch {
 
 /// The ids of the first of some loops, and how many more there are.
 fn named(pieces: &[&BoundaryLoop]) -> String {
-    let ids: Vec<String> = pieces
-        .iter()
-        .take(MAX_NAMED)
-        .map(|l| l.id.to_string())
-        .collect();
-    match pieces.len().saturating_sub(MAX_NAMED) {
-        0 => ids.join(", "),
-        more => format!("{} and {more} more", ids.join(", ")),
-    }
+    first_of(pieces.iter().map(|l| l.id.to_string()), MAX_NAMED)
 }

@@ -1,18 +1,18 @@
 //! Finds loops by a place near them: thousands of places among hundreds of thousands of loops.
 
+use crate::point_limit::PointLimit;
 use crate::welded_scan::WeldedScan;
 use darn_budget::{Budget, Exhausted, Steps};
 use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind};
 use darn_geometry::mesh::nearest::distance_to_loop;
-use darn_geometry::mesh::{TriMesh, Vec3, diagonal};
+use darn_geometry::mesh::{TriMesh, Vec3};
 
 /// Finds the loop that is nearest to a point; an outer boundary only in a scan that has no other loops.
 pub struct NearestLoop<'a> {
     welded: &'a WeldedScan,
     /// The loops with the balls around them; made when the first point is looked for.
     balls: Option<Vec<RimBall<'a>>>,
-    /// A point must not lie farther from a loop: the scan's diagonal, scene units.
-    limit: Option<f64>,
+    limit: PointLimit<'a>,
     steps: Steps<'a>,
 }
 
@@ -34,7 +34,7 @@ impl<'a> NearestLoop<'a> {
         NearestLoop {
             welded,
             balls: None,
-            limit: None,
+            limit: PointLimit::of(&welded.surface.mesh),
             steps: Steps::of(budget),
         }
     }
@@ -69,13 +69,8 @@ impl<'a> NearestLoop<'a> {
         let Some((distance, rim)) = best else {
             return Ok(Err("the scan has no boundary loop".to_owned()));
         };
-        let limit = *self.limit.get_or_insert_with(|| diagonal(&mesh.positions));
-        Ok(match distance <= limit {
-            true => Ok(rim),
-            false => Err(format!(
-                "`near` lies {distance:.4} from the nearest loop; the limit is the scan's diagonal, {limit:.4}"
-            )),
-        })
+        let checked = self.limit.check("near", distance, "loop");
+        Ok(checked.map(|()| rim))
     }
 }
 

@@ -86,14 +86,7 @@ fn prepared(
         if sound.is_none() && !left.is_empty() {
             break;
         }
-        let cloth = match &sound {
-            None => scanned,
-            Some(sound) => BoundedMesh {
-                topology: &sound.topology,
-                loops: &sound.loops,
-                ..scanned
-            },
-        };
+        let cloth = (sound.as_ref()).map_or(scanned, |sound| sound.bounded(scanned));
         let cloth = Cloth {
             whole: &cloth,
             blocks: &welded.blocks,

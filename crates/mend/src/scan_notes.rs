@@ -105,23 +105,29 @@ pub fn set_aside(welded: &WeldedScan, scan: &Scan) -> Vec<v1::SetAside> {
 
 /// The first places of a list by index and name, and how many more there are.
 fn listed(what: &str, places: &[NamedPlace]) -> String {
-    let named = places.iter().take(MAX_NAMED).map(|place| match place.name {
+    let names = places.iter().map(|place| match place.name {
         Some(name) => format!("{what} {} {:?}", place.index, excerpt(name)),
         None => format!("{what} {}", place.index),
     });
-    let named: Vec<String> = named.collect();
-    let more = places.len().saturating_sub(MAX_NAMED);
-    let rest = if more > 0 {
-        format!(" and {more} more")
-    } else {
-        String::new()
-    };
-    named.join(", ") + &rest
+    first_of(names, MAX_NAMED)
+}
+
+/// The first of some names, `most` at most, and how many more there are.
+pub fn first_of(names: impl ExactSizeIterator<Item = String>, most: usize) -> String {
+    let more = names.len().saturating_sub(most);
+    let first: Vec<String> = names.take(most).collect();
+    match more {
+        0 => first.join(", "),
+        more => format!("{} and {more} more", first.join(", ")),
+    }
 }
 
 /// Number of components of few faces beside others of more.
 fn scraps(welded: &WeldedScan) -> usize {
     let topology = &welded.topology;
+    if topology.components < 2 {
+        return 0;
+    }
     let mut faces = vec![0usize; topology.components];
     for face in (0..welded.surface.mesh.faces.len() as u32).map(FaceId) {
         faces[topology.component(face) as usize] += 1;

@@ -2,11 +2,12 @@
 
 use std::f64::consts::PI;
 
-use crate::bites::inner_angle;
+use crate::point_limit::PointLimit;
 use crate::welded_scan::WeldedScan;
 use darn_budget::{Budget, Exhausted, Steps};
+use darn_geometry::mesh::Vec3;
+use darn_geometry::mesh::curvature::inner_angle;
 use darn_geometry::mesh::loops::BoundaryLoop;
-use darn_geometry::mesh::{Vec3, diagonal};
 
 /// Nanoseconds of work a vertex of the loops for two points that are looked for.
 const VERTEX_WORK: u64 = 20;
@@ -109,8 +110,7 @@ struct Nearest<'a> {
 /// Finds the ways along the scan's loops between two points each.
 pub struct Places<'a> {
     whole: &'a WeldedScan,
-    /// A point must not lie farther from an edge: the scan's diagonal, scene units.
-    limit: f64,
+    limit: PointLimit<'a>,
 }
 
 impl<'a> Places<'a> {
@@ -118,7 +118,7 @@ impl<'a> Places<'a> {
     pub fn of(whole: &'a WeldedScan) -> Places<'a> {
         Places {
             whole,
-            limit: diagonal(&whole.surface.mesh.positions),
+            limit: PointLimit::of(&whole.surface.mesh),
         }
     }
 
@@ -174,14 +174,7 @@ impl<'a> Places<'a> {
 
     /// Why a point that far from the cloth's edge is refused, if it is.
     pub fn within_limit(&self, name: &str, distance: f64) -> Result<(), String> {
-        // What is no number is far, too.
-        match distance <= self.limit {
-            true => Ok(()),
-            false => Err(format!(
-                "`{name}` lies {distance:.4} from the nearest edge of the cloth; the limit is the scan's diagonal, {:.4}",
-                self.limit
-            )),
-        }
+        self.limit.check(name, distance, "edge of the cloth")
     }
 }
 

@@ -10,7 +10,12 @@ use super::{TriMesh, Vec3};
 /// (Gauss–Bonnet), 0 on developable cloth. On the boundary that is not curvature; see
 /// [`turning`](super::turning::turning).
 pub fn angle_defect(mesh: &TriMesh, topology: &Topology, vertex: VertexId) -> f64 {
-    angle_defect_of(topology, vertex, |h| {
+    TAU - inner_angle(mesh, topology, vertex)
+}
+
+/// The angle of the faces at a vertex, radians.
+pub fn inner_angle(mesh: &TriMesh, topology: &Topology, vertex: VertexId) -> f64 {
+    sum_at(topology, vertex, |h| {
         mesh.corner_angle(h.face().index(), h.corner())
     })
 }
@@ -21,7 +26,12 @@ pub(super) fn angle_defect_of(
     vertex: VertexId,
     angle: impl Fn(HalfEdgeId) -> f64,
 ) -> f64 {
-    TAU - topology.leaving(vertex).into_iter().map(angle).sum::<f64>()
+    TAU - sum_at(topology, vertex, angle)
+}
+
+/// The sum of what a function gives for the half-edges that leave a vertex.
+fn sum_at(topology: &Topology, vertex: VertexId, angle: impl Fn(HalfEdgeId) -> f64) -> f64 {
+    topology.leaving(vertex).into_iter().map(angle).sum()
 }
 
 /// Per face its area, scene units squared.

@@ -28,6 +28,15 @@ pub struct SoundHole {
 const FACE_WORK: u64 = 60;
 
 impl SoundHole {
+    /// The mesh that it is a hole of, as if it did not have the faces left out.
+    pub fn bounded<'a>(&'a self, whole: BoundedMesh<'a>) -> BoundedMesh<'a> {
+        BoundedMesh {
+            topology: &self.topology,
+            loops: &self.loops,
+            ..whole
+        }
+    }
+
     /// The hole of loop `rim` without `faces`, and without what they alone join to the rest of the cloth.
     ///
     /// `None` when there is no such loop, when nothing is left out, or when the faces do not open the hole to one

@@ -59,8 +59,48 @@ pub fn stands_out(region: &Region, chart: &Chart, budget: &Budget) -> Result<boo
     if !lies_flat(chart) {
         return Ok(false);
     }
-    let peeling = Peeling::new(region, chart);
-    Ok(peeling.apart(budget)?.len() >= FEWEST)
+    let mut rim = region.rim.clone();
+    rim.sort_unstable();
+    rim.dedup();
+    let found = apart(region, chart, &rim, budget)?;
+    Ok(found.len() >= FEWEST)
+}
+
+/// Mean edge of a region's rim, scene units.
+fn mean_edge(region: &Region) -> f64 {
+    let count = region.rim.len();
+    let place = |k: usize| region.mesh.positions[region.rim[k % count] as usize];
+    let length: f64 = (0..count).map(|k| (place(k + 1) - place(k)).norm()).sum();
+    length / count.max(1) as f64
+}
+
+/// Of some vertices, ascending, those that are farther from another one in space than cloth can be, each with all of these partners, of a selection.
+///
+/// # Errors
+/// `Exhausted`.
+fn apart(
+    region: &Region,
+    chart: &Chart,
+    rim: &[u32],
+    budget: &Budget,
+) -> Result<Vec<(u32, Vec<u32>)>, Exhausted> {
+    let partners: Vec<u32> = (rim.iter())
+        .step_by((rim.len() / PARTNERS).max(1))
+        .copied()
+        .collect();
+    budget.spend(PAIR_WORK * (rim.len() * partners.len()) as u64)?;
+    let (flat, space) = (&chart.flat, &region.mesh.positions);
+    let least = APART_EDGES * mean_edge(region);
+    let is_apart = |a: u32, b: u32| {
+        let (a, b) = (a as usize, b as usize);
+        let most = APART * (flat[a] - flat[b]).norm() + least;
+        (space[a] - space[b]).norm_squared() > most * most
+    };
+    let with_partners = rim.iter().map(|v| {
+        let all = partners.iter().filter(|w| is_apart(*v, **w));
+        (*v, all.copied().collect::<Vec<u32>>())
+    });
+    Ok(with_partners.filter(|(_, all)| !all.is_empty()).collect())
 }
 
 /// The faces of the pieces at a region's rim that stand out of the surface, ascending; empty where none does, or where it cannot be told which.
@@ -106,9 +146,7 @@ struct Peeling<'a> {
 
 impl<'a> Peeling<'a> {
     fn new(region: &'a Region, chart: &'a Chart) -> Peeling<'a> {
-        let (mesh, count) = (&region.mesh, region.rim.len());
-        let place = |k: usize| mesh.positions[region.rim[k % count] as usize];
-        let length: f64 = (0..count).map(|k| (place(k + 1) - place(k)).norm()).sum();
+        let mesh = &region.mesh;
         let mut around = vec![Vec::new(); mesh.positions.len()];
         for (f, face) in (0u32..).zip(&mesh.faces) {
             face.iter().for_each(|v| around[*v as usize].push(f));
@@ -118,7 +156,7 @@ impl<'a> Peeling<'a> {
         Peeling {
             region,
             chart,
-            edge: length / count.max(1) as f64,
+            edge: mean_edge(region),
             around,
             taken: vec![false; mesh.faces.len()],
             at_rim,
@@ -129,30 +167,6 @@ impl<'a> Peeling<'a> {
     fn rim(&self) -> Vec<u32> {
         let all = 0..self.at_rim.len() as u32;
         all.filter(|v| self.at_rim[*v as usize]).collect()
-    }
-
-    /// The vertices of the rim that are farther from another one in space than cloth can be, each with all of these partners, of a selection.
-    ///
-    /// # Errors
-    /// `Exhausted`.
-    fn apart(&self, budget: &Budget) -> Result<Vec<(u32, Vec<u32>)>, Exhausted> {
-        let rim = self.rim();
-        let partners: Vec<u32> = (rim.iter())
-            .step_by((rim.len() / PARTNERS).max(1))
-            .copied()
-            .collect();
-        budget.spend(PAIR_WORK * (rim.len() * partners.len()) as u64)?;
-        let (flat, space) = (&self.chart.flat, &self.region.mesh.positions);
-        let is_apart = |a: u32, b: u32| {
-            let (a, b) = (a as usize, b as usize);
-            let most = APART * (flat[a] - flat[b]).norm() + APART_EDGES * self.edge;
-            (space[a] - space[b]).norm_squared() > most * most
-        };
-        let with_partners = rim.iter().map(|v| {
-            let all = partners.iter().filter(|w| is_apart(*v, **w));
-            (*v, all.copied().collect::<Vec<u32>>())
-        });
-        Ok(with_partners.filter(|(_, all)| !all.is_empty()).collect())
     }
 
     /// A smooth surface through the cloth that is farther from the rim on the chart than this share of the hole's width; `None` where there is too little.
@@ -191,7 +205,7 @@ impl<'a> Peeling<'a> {
         let mut blamed_ever = vec![false; departure.len()];
         let mut rings = 0;
         while rings < MAX_RINGS {
-            let apart = self.apart(budget)?;
+            let apart = apart(self.region, self.chart, &self.rim(), budget)?;
             let before = *first.get_or_insert(apart.len());
             if before < FEWEST {
                 return Ok(None);
