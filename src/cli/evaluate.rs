@@ -40,6 +40,9 @@ pub struct EvaluateArgs {
     /// Measure the mended garments of another filler instead: a folder with a GLB of the hole's name for each
     #[arg(long, value_name = "FOLDER", requires = "garments")]
     mended: Option<PathBuf>,
+    /// Count which loops would be closed by default after trimming, noise, torn and bitten edges, too
+    #[arg(long, requires = "garments", conflicts_with = "mended")]
+    worn: bool,
     /// How many samples, the sheets in turn
     #[arg(long, value_name = "N", default_value_t = 100)]
     samples: usize,
@@ -214,6 +217,13 @@ fn garments(args: &EvaluateArgs, set: Option<&Path>) -> Result<(), Failure> {
     drop(progress);
     let report = report.or_fail("evaluate")?;
     print!("{}", report.markdown());
+    if args.worn {
+        let progress = WorkProgress::counted("worn garments", cases.len() as u64);
+        let rows = evaluate::over_worn_garments(&cases, &list, args.seed, &|| progress.advance(1));
+        drop(progress);
+        let rows = rows.or_fail("evaluate")?;
+        print!("\n{}", evaluate::worn_table(&rows));
+    }
     match &args.json {
         Some(path) => files::write(path, &files::json(&json!(report), "write the report")?),
         None => Ok(()),

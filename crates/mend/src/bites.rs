@@ -10,6 +10,7 @@ use darn_geometry::mesh::curvature::inner_angle;
 use darn_geometry::mesh::loops::BoundaryLoop;
 use darn_geometry::mesh::topology::Topology;
 use darn_geometry::mesh::{TriMesh, Vec2};
+use nalgebra::Rotation2;
 
 /// Points that a loop is looked at in, at most: a bite is wider than two of their distances.
 const SAMPLES: usize = 512;
@@ -21,10 +22,23 @@ const LONGEST: f64 = 0.55;
 const LEAST_DETOUR: f64 = 1.2;
 /// Least depth of a bite, in mean edges of its loop.
 const LEAST_DEPTH: f64 = 3.0;
-/// How far the hem is looked at on each side of a bite, in lengths of its mouth, and the largest angle between it and the mouth, radians: less hem
-/// has to be straighter.
-const HEMS: [(f64, f64); 2] = [(1.0, 0.45), (0.3, 0.2)];
-/// The least that it is looked at, as a share of the loop.
+/// How the hems beside a bite may run: less hem has to be straighter.
+const HEMS: [HemRule; 4] = [
+    HemRule::straight(1.0, 0.45),
+    HemRule::straight(0.3, 0.2),
+    HemRule::straight(0.15, 0.1),
+    // A round opening's edge. Its own arcs lead into the cloth as well: one that is 1.4 times as long as its chord leaves it by 0.4 rad more than
+    // the edge would turn over the chord.
+    HemRule {
+        reach: 0.3,
+        angle: 0.2,
+        least_detour: 1.4,
+        turns: true,
+    },
+];
+/// How much a hem may turn from the middle of a mouth to the middle of the hem, radians.
+const MOST_TURN: f64 = 0.6;
+/// The least of a hem that is looked at, as a share of the loop.
 const LEAST_HEM: f64 = 0.03;
 /// Largest ratio of length to chord of the hem on each side.
 const LARGEST_WAVE: f64 = 1.1;
@@ -91,7 +105,31 @@ pub fn bites(
     Ok(apart)
 }
 
-/// A loop laid flat, twice around, so that a stretch may run over its first vertex.
+/// How the hems on both sides of a bite may run.
+struct HemRule {
+    /// How far they are looked at, in lengths of the mouth.
+    reach: f64,
+    /// The largest angle between each and the direction in which it should run, radians.
+    angle: f64,
+    /// Least ratio of the bite's stretch to its mouth.
+    least_detour: f64,
+    /// Whether the hem should turn across the mouth as it does along itself; otherwise it should run as the mouth does.
+    turns: bool,
+}
+
+impl HemRule {
+    const fn straight(reach: f64, angle: f64) -> HemRule {
+        HemRule {
+            reach,
+            angle,
+            least_detour: LEAST_DETOUR,
+            turns: false,
+        }
+    }
+}
+
+/// A loop laid flat, three times around, so that a stretch that starts in the middle round may run over its first vertex, and the hem before it, too.
+/// Rounds differ by the loop's turning.
 struct FlatLine {
     /// The loop's length.
     length: f64,
@@ -99,8 +137,10 @@ struct FlatLine {
     edge: f64,
     /// How many vertices it has.
     vertices: usize,
-    /// Per vertex, twice around and once more: its place, and the length up to it.
+    /// Per vertex, three times around and once more: its place, and the length up to it.
     places: Vec<(Vec2, f64)>,
+    /// Per vertex, three times around and once more: the turning of all vertices before it, radians.
+    turned: Vec<f64>,
     /// Vertices at about equal distances, once around.
     samples: Vec<usize>,
 }
@@ -113,9 +153,12 @@ impl FlatLine {
             .map(|v| PI - inner_angle(mesh, topology, *v))
             .collect();
         let (mut place, mut passed, mut heading) = (Vec2::zeros(), 0.0, 0.0_f64);
-        let mut places = Vec::with_capacity(2 * n + 1);
-        for k in 0..=2 * n {
+        let mut places = Vec::with_capacity(3 * n + 1);
+        let (mut turned, mut turning) = (Vec::with_capacity(3 * n + 1), 0.0);
+        for k in 0..=3 * n {
             places.push((place, passed));
+            turned.push(turning);
+            turning += turns[k % n];
             heading = (heading + turns[k % n]) % TAU;
             let edge = (at(k + 1) - at(k)).norm();
             place += Vec2::new(heading.cos(), heading.sin()) * edge;
@@ -137,14 +180,15 @@ impl FlatLine {
             edge: length / n as f64,
             vertices: n,
             places,
+            turned,
             samples,
         }
     }
 
-    /// The vertex of a sample, twice around.
+    /// The vertex of a sample, from the middle round on.
     fn sample(&self, s: usize) -> usize {
         let count = self.samples.len();
-        self.samples[s % count] + (s / count) * self.vertices
+        self.samples[s % count] + (1 + s / count) * self.vertices
     }
 
     /// The length from one sample to another.
@@ -163,10 +207,25 @@ impl FlatLine {
             return None;
         }
         let along = chord / mouth;
-        let is_between_hems = HEMS.iter().any(|(share, turn)| {
-            let reach = (share * mouth).max(LEAST_HEM * self.length);
-            let straight = |hem: Option<Vec2>| hem.is_some_and(|hem| along.dot(&hem) > turn.cos());
-            straight(self.hem(from, -reach)) && straight(self.hem(to, reach))
+        let is_between_hems = HEMS.iter().any(|rule| {
+            if length < rule.least_detour * mouth {
+                return false;
+            }
+            let reach = (rule.reach * mouth).max(LEAST_HEM * self.length);
+            let turn = if rule.turns {
+                // From the middle of the mouth to the middle of the hem.
+                self.turning_beside(from, to, 2.0 * reach) * 0.5 * (mouth + reach)
+            } else {
+                0.0
+            };
+            if turn.abs() > MOST_TURN {
+                return false;
+            }
+            let runs = |hem: Option<Vec2>, turn: f64| {
+                let expected = Rotation2::new(turn) * along;
+                hem.is_some_and(|hem| expected.dot(&hem) > rule.angle.cos())
+            };
+            runs(self.hem(from, -reach), -turn) && runs(self.hem(to, reach), turn)
         });
         if !is_between_hems {
             return None;
@@ -186,14 +245,22 @@ impl FlatLine {
         })
     }
 
+    /// How the hems beside a stretch turn over this length on each side, radians a scene unit; infinite where they are not smooth.
+    fn turning_beside(&self, from: usize, to: usize, reach: f64) -> f64 {
+        if self.hem(from, -reach).is_none() || self.hem(to, reach).is_none() {
+            return f64::INFINITY;
+        }
+        let place = |passed: f64| self.places.partition_point(|(_, p)| *p < passed);
+        let first = place(self.places[from].1 - reach);
+        let last = place(self.places[to].1 + reach).min(3 * self.vertices);
+        // The corners of the stretch do not count.
+        let turned = |from: usize, to: usize| self.turned[to.max(from + 1)] - self.turned[from + 1];
+        (turned(first, from) + turned(to, last)) / (2.0 * reach)
+    }
+
     /// The direction of the hem over this length after a vertex, before it where the length is negative; `None` where
     /// the hem is not smooth.
     fn hem(&self, vertex: usize, reach: f64) -> Option<Vec2> {
-        // In the first round there is no hem before the first vertex, in the second none after the last.
-        let vertex = match reach < 0.0 && vertex < self.vertices {
-            true => vertex + self.vertices,
-            false => vertex % self.vertices,
-        };
         let (place, passed) = self.places[vertex];
         let end = self.places.partition_point(|(_, p)| *p < passed + reach);
         let (other, at) = *self.places.get(end)?;
@@ -215,9 +282,11 @@ impl FlatLine {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
     use darn_geometry::mesh::Vec3;
     use darn_geometry::mesh::loops::{LoopKind, boundary_loops};
-    use darn_geometry::mesh::shapes::sheet;
+    use darn_geometry::mesh::shapes::{sheet, tube};
     use darn_geometry::mesh::weld::weld;
 
     fn found(keep: impl Fn(f64, f64) -> bool, fold: f64) -> Vec<(Bite, Vec3, Vec3)> {
@@ -273,6 +342,7 @@ mod tests {
         };
         for bites in [
             found(wide(0.5, 0.2), 0.0),
+            found(wide(0.7, 0.3), 0.0),
             found(saw(0.6), 0.0),
             found(saw(0.8), 0.02),
         ] {
@@ -283,6 +353,36 @@ mod tests {
                 bite.depth > 0.15 && from.y < 0.05 && to.y < 0.05,
                 "{bites:?}"
             );
+        }
+    }
+
+    /// Bites of the loops of a ball with a mouth at either pole, each this wide from it, radians; the mouth at the lower one may be torn.
+    fn of_bag(mouth: f64, flat: f64, keep: impl Fn(f64, f64) -> bool) -> Vec<Vec<Bite>> {
+        let mut soup = tube(72, keep);
+        for p in &mut soup.positions {
+            let polar = mouth + (PI - 2.0 * mouth) * p.z / 4.0;
+            *p = Vec3::new(p.x * polar.sin(), flat * p.y * polar.sin(), -polar.cos());
+        }
+        let mesh = weld(&soup).mesh;
+        let topology = Topology::new(&mesh);
+        let mut loops = boundary_loops(&mesh, &topology);
+        loops.sort_by(|a, b| a.centroid.z.total_cmp(&b.centroid.z));
+        let bites = |l: &BoundaryLoop| bites(&mesh, &topology, l, Budget::unlimited()).unwrap();
+        loops.iter().map(bites).collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        #[test]
+        fn a_rip_of_a_round_opening_is_found_and_its_own_arcs_are_none(
+            mouth in 0.4..1.2f64, flat in 0.7..1.0f64, depth in 0.2..0.35f64, width in 1.0..3.5f64, at in 0.0..1.0f64,
+        ) {
+            let away = move |u: f64| 72.0 * (u - at).abs().min(1.0 - (u - at).abs());
+            let ripped = of_bag(mouth, flat, |u, v| away(u) > width || v > depth * (1.0 - away(u) / width / 2.0));
+            prop_assert_eq!(ripped.iter().map(Vec::len).collect::<Vec<_>>(), [1, 0], "{:?}", ripped);
+            let whole = of_bag(mouth, flat, |_, _| true);
+            prop_assert_eq!(whole.iter().map(Vec::len).collect::<Vec<_>>(), [0, 0], "{:?}", whole);
         }
     }
 

@@ -10,6 +10,7 @@ use darn_budget::Budget;
 use darn_contract::{Anchor, Constraints, Edit, FieldError, Fill, HoleSelector, error_chain, v1};
 use darn_geometry::mesh::Vec3;
 use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind};
+use darn_geometry::mesh::openings::{Evidence, EvidenceKind};
 use darn_gltf_scan::Scan;
 
 /// Which loops are filled with which constraints, and which are left.
@@ -265,6 +266,12 @@ impl SkipReason {
     }
 }
 
+/// Whether a loop's rim is torn where the piece's other edges are finished.
+fn is_torn(rim: &BoundaryLoop) -> bool {
+    let speaks_for_a_hole = |e: &Evidence| e.kind == EvidenceKind::Rim && e.weight < 0.0;
+    rim.evidence.iter().any(speaks_for_a_hole)
+}
+
 /// Why a loop is left as it is when no selector names it; `None` for one that the request fills.
 fn reason_to_skip(
     scan: &Scan,
@@ -286,11 +293,19 @@ fn reason_to_skip(
             return SkipReason::new("outer_boundary", phrase);
         }
         (LoopKind::TubeEnd, Some(Fill::Holes) | None) => {
-            let phrase = "the end of a tube, such as a sleeve; name it to fill it";
+            let phrase = if is_torn(rim) {
+                "the end of a tube, such as a sleeve, but torn where the piece's other edges are finished; if it is a hole, name it to fill it"
+            } else {
+                "the end of a tube, such as a sleeve; name it to fill it"
+            };
             return SkipReason::new("tube_end", phrase);
         }
         (LoopKind::Opening, Some(Fill::Holes) | None) => {
-            let phrase = "an opening, such as a neck; name it to fill it";
+            let phrase = if is_torn(rim) {
+                "an opening, such as a neck, but torn where the piece's other edges are finished; if it is a hole, name it to fill it"
+            } else {
+                "an opening, such as a neck; name it to fill it"
+            };
             return SkipReason::new("opening", phrase);
         }
         _ => {}

@@ -47,9 +47,9 @@ pub struct BoundaryLoop {
     pub kind: LoopKind,
     /// Largest distance between two of its vertices, scene units, found by `diameter` in a few sweeps.
     pub diameter: f64,
-    /// Probability of the kind, 0.5 to 1, of a hole or an opening; 1 for other kinds.
+    /// Probability of the kind, 0.5 to 1, of a hole, an opening, or a tube's end that may be a hole; 1 for others.
     pub confidence: f64,
-    /// What the kind of a hole or an opening rests on.
+    /// What the kind of a hole or an opening rests on, and of a tube's end that may be a hole.
     pub evidence: Vec<Evidence>,
     /// The component of the mesh it bounds; see [`Topology::component`].
     pub component: u32,

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::index::FaceId;
 use super::loops::{BoundaryLoop, LoopKind, boundary_loops};
-use super::openings::{PRIOR, SUREST};
+use super::openings::{EvidenceKind, PRIOR, SUREST};
 use super::pairing::Paired;
 use super::shapes::{jitter, sheet, tube};
 use super::topology::Topology;
@@ -123,6 +123,29 @@ proptest! {
             let found = kinds(&soup);
             prop_assert!(found.len() == 2 && !found.contains(&LoopKind::Hole), "{:?}", found);
         }
+    }
+
+    #[test]
+    fn a_large_lobed_hole_of_a_trimmed_bag_is_a_hole(n in 48usize..70, mouth in 0.7..1.0f64, radius in 0.15..0.22f64, lobes in 0.15..0.3f64, seed: u64) {
+        let hole = |u: f64, v: f64| {
+            let angle = (v - 0.5).atan2(u - 0.5);
+            (u - 0.5).hypot(v - 0.5) > radius * (1.0 + lobes * (3.0 * angle).sin() + 0.5 * lobes * (7.0 * angle).cos())
+        };
+        let mut found = kinds(&trimmed(&bag(n, mouth, hole), seed));
+        found.sort_unstable_by_key(|k| *k != LoopKind::Hole);
+        prop_assert!(found.len() == 3 && found[0] == LoopKind::Hole && !found[1..].contains(&LoopKind::Hole), "{:?}", found);
+    }
+
+    #[test]
+    fn a_torn_end_of_a_tube_is_in_doubt(n in 24usize..60, depth in 0.05..0.15f64, seed: u64) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let ends: Vec<f64> = (0..n).map(|_| depth * rng.random_range(0.0..1.0)).collect();
+        let torn = |u: f64, v: f64| v > ends[(u * n as f64) as usize % n];
+        let loops = loops_of(&tube(n, torn));
+        let doubtful = |l: &BoundaryLoop| l.confidence < 1.0 && l.evidence.iter().any(|e| e.kind == EvidenceKind::Rim && e.weight < 0.0);
+        let mut found: Vec<(LoopKind, bool)> = (loops.iter().filter(|l| l.vertices.len() > 12)).map(|l| (l.kind, doubtful(l))).collect();
+        found.sort_unstable_by_key(|f| f.1);
+        prop_assert_eq!(found, [(LoopKind::TubeEnd, false), (LoopKind::TubeEnd, true)]);
     }
 
     #[test]

@@ -196,7 +196,7 @@ fn openings(case: &GarmentCase, found: &[ListedLoop]) -> Vec<OpeningRow> {
     case.record.openings.iter().map(row).collect()
 }
 
-fn nearest<'a>(loops: &'a [ListedLoop], at: &Vec3) -> Option<&'a ListedLoop> {
+pub(super) fn nearest<'a>(loops: &'a [ListedLoop], at: &Vec3) -> Option<&'a ListedLoop> {
     let off = |l: &ListedLoop| (l.centroid - at).norm();
     loops.iter().min_by(|a, b| off(a).total_cmp(&off(b)))
 }
@@ -206,7 +206,7 @@ fn key(p: &Vec3) -> [u32; 3] {
 }
 
 /// The vertex of the rim that is nearest to a point.
-fn on_rim(mesh: &TriMesh, lost: &TriMesh, centroid: &Vec3) -> Vec3 {
+pub(super) fn on_rim(mesh: &TriMesh, lost: &TriMesh, centroid: &Vec3) -> Vec3 {
     let kept: HashSet<[u32; 3]> = mesh.positions.iter().map(key).collect();
     let rim = lost.positions.iter().filter(|p| kept.contains(&key(p)));
     let off = |p: &&Vec3| (*p - centroid).norm();
@@ -215,7 +215,7 @@ fn on_rim(mesh: &TriMesh, lost: &TriMesh, centroid: &Vec3) -> Vec3 {
 }
 
 /// Centroid of the loop through a vertex.
-fn loop_centroid(mesh: &TriMesh, at: &Vec3) -> Vec3 {
+pub(super) fn loop_centroid(mesh: &TriMesh, at: &Vec3) -> Vec3 {
     let topology = Topology::new(mesh);
     let through = |l: &darn_geometry::mesh::loops::BoundaryLoop| {
         l.vertices
