@@ -96,10 +96,18 @@ fn candidate_line(candidate: &BorderCandidate) -> String {
             "tear between loops {id} and {facing}, {:.4} long and {:.4} wide",
             candidate.length, candidate.mouth
         ),
-        None => format!(
-            "bite or rip at loop {id}, {:.4} wide and {:.4} deep",
-            candidate.mouth, candidate.depth
-        ),
+        None => {
+            let is_corner = (candidate.border.as_ref()).is_some_and(|b| !b.along.is_empty());
+            let what = if is_corner {
+                "torn corner"
+            } else {
+                "bite or rip"
+            };
+            format!(
+                "{what} at loop {id}, {:.4} wide and {:.4} deep",
+                candidate.mouth, candidate.depth
+            )
+        }
     };
     format!("{what}\n      border: {border}\n")
 }

@@ -103,6 +103,29 @@ fn a_rip_is_closed_and_a_torn_corner_is_mended_up_to_a_line() {
 }
 
 #[test]
+fn torn_corners_are_found_and_mended_up_to_where_they_were() {
+    let ragged = |u: f64, v: f64| u + v > 0.3 + 0.04 * (9.0 * v.atan2(u)).sin();
+    for (mesh, fold) in [
+        (torn(|u, v| u + v > 0.3, 0.0), 0.0),
+        (torn(ragged, 0.02), 0.02),
+    ] {
+        let bytes = packed(&mesh, &[]);
+        let told = candidates(&bytes);
+        assert_eq!(told.len(), 1, "{told:?}");
+        assert_eq!(told[0].border.as_ref().map(|b| b.along.len()), Some(1));
+        let error = mended(&bytes, &Constraints::default()).unwrap_err();
+        assert_eq!(error.code().word, "no_holes");
+        let answer = mended(&bytes, &asking(Border::Auto)).unwrap();
+        let share = share_mended(&answer.bytes, &mesh, fold);
+        assert!((0.93..1.07).contains(&share), "fold {fold}: {share}");
+        let after = MendedScan::of(&answer.bytes);
+        let corner = after.new_positions().into_iter();
+        let off = corner.map(|p| p.norm()).fold(f64::INFINITY, f64::min);
+        assert!(off < 0.03, "fold {fold}: {off}");
+    }
+}
+
+#[test]
 fn a_border_without_a_bite_is_refused_at_its_place() {
     let whole = packed(&torn(|_, _| true, 0.0), &[]);
     assert!(candidates(&whole).is_empty());
@@ -280,12 +303,13 @@ fn bag(keep: impl Fn(f64, f64) -> bool) -> TriMesh {
 }
 
 #[test]
-fn an_opening_with_a_rip_stays_open_and_the_rip_is_mended_where_it_is_named() {
+fn an_opening_with_a_rip_stays_open_and_the_rip_is_mended_named_or_found() {
     for depth in [0.15, 0.3] {
         let ripped = bag(|u, v| (u - 0.5).abs() * 48.0 > 1.0 || v > depth);
         let bytes = packed(&ripped, &[]);
         let error = mended(&bytes, &Constraints::default()).unwrap_err();
         assert_eq!(error.code().word, "no_holes");
+        assert_eq!(candidates(&bytes).len(), 1);
         // The rip's mouth, at the other side of the bag's mouth from where its angles begin.
         let lip = |angle: f64| {
             let (sin, cos) = (std::f64::consts::PI + angle).sin_cos();
@@ -297,10 +321,12 @@ fn an_opening_with_a_rip_stays_open_and_the_rip_is_mended_where_it_is_named() {
             to: lip(0.14),
             along: Vec::new(),
         };
-        let answer = mended(&bytes, &asking(named)).unwrap();
         let lost = area(&bag(|_, _| true)) - area(&ripped);
-        let share = MendedScan::of(&answer.bytes).patch_area() / lost;
-        assert!((0.7..1.3).contains(&share), "{depth}: {share}");
+        for border in [named, Border::Auto] {
+            let answer = mended(&bytes, &asking(border)).unwrap();
+            let share = MendedScan::of(&answer.bytes).patch_area() / lost;
+            assert!((0.7..1.3).contains(&share), "{depth}: {share}");
+        }
     }
 }
 

@@ -1,19 +1,18 @@
 //! Bites and rips at the cloth's own edge: short stretches of a boundary loop that lead into the cloth, between hems
-//! that continue each other.
+//! that continue each other; and torn corners, between hems that meet as those of the piece's other corners do.
 
-use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
 use darn_budget::{Budget, Exhausted, Steps};
 
-use darn_geometry::mesh::curvature::inner_angle;
 use darn_geometry::mesh::loops::BoundaryLoop;
 use darn_geometry::mesh::topology::Topology;
-use darn_geometry::mesh::{TriMesh, Vec2};
+use darn_geometry::mesh::{TriMesh, Vec2, Vec3};
 use nalgebra::Rotation2;
 
-/// Points that a loop is looked at in, at most: a bite is wider than two of their distances.
-const SAMPLES: usize = 512;
+use crate::flat_line::FlatLine;
+use crate::torn_corners::torn_corners;
+
 /// Fewest vertices of a loop that is looked at.
 const LEAST_VERTICES: usize = 16;
 /// Longest stretch of a bite, as a share of its loop.
@@ -21,7 +20,7 @@ const LONGEST: f64 = 0.55;
 /// Least ratio of a bite's stretch to its mouth.
 const LEAST_DETOUR: f64 = 1.2;
 /// Least depth of a bite, in mean edges of its loop.
-const LEAST_DEPTH: f64 = 3.0;
+pub const LEAST_DEPTH: f64 = 3.0;
 /// How the hems beside a bite may run: less hem has to be straighter.
 const HEMS: [HemRule; 4] = [
     HemRule::straight(1.0, 0.45),
@@ -39,11 +38,9 @@ const HEMS: [HemRule; 4] = [
 /// How much a hem may turn from the middle of a mouth to the middle of the hem, radians.
 const MOST_TURN: f64 = 0.6;
 /// The least of a hem that is looked at, as a share of the loop.
-const LEAST_HEM: f64 = 0.03;
-/// Largest ratio of length to chord of the hem on each side.
-const LARGEST_WAVE: f64 = 1.1;
+pub const LEAST_HEM: f64 = 0.03;
 /// Nanoseconds of work a pair of points.
-const PAIR_WORK: u64 = 150;
+pub const PAIR_WORK: u64 = 150;
 /// Nanoseconds of work an edge of a loop.
 const EDGE_WORK: u64 = 200;
 
@@ -58,11 +55,24 @@ pub struct Bite {
     pub length: f64,
     /// Distance of its ends on the cloth laid flat, scene units.
     pub mouth: f64,
-    /// How far it leads into the cloth laid flat, scene units.
+    /// How far it leads into the cloth laid flat, scene units; from the corner, where one is torn off.
     pub depth: f64,
+    /// Where a torn corner was: where the hems on both sides meet; `None` where they continue each other.
+    pub corner: Option<Vec3>,
 }
 
-/// The bites of a boundary loop, in its order; they do not overlap. The loop is looked at as it lies when the cloth along
+impl Bite {
+    /// Whether two bites of a loop of so many vertices have a stretch of it in common.
+    pub fn overlaps(&self, other: &Bite, vertices: usize) -> bool {
+        let within = |bite: &Bite, vertex: usize| {
+            let ahead = |to: usize| (to + vertices - bite.from) % vertices;
+            ahead(vertex) <= ahead(bite.to)
+        };
+        within(self, other.from) || within(self, other.to) || within(other, self.from)
+    }
+}
+
+/// The bites and torn corners of a boundary loop, in its order; they do not overlap. The loop is looked at as it lies when the cloth along
 /// it is laid flat: edges keep their lengths, and the direction turns at each vertex by its geodesic curvature, so that
 /// folds do not count.
 ///
@@ -94,10 +104,14 @@ pub fn bites(
     // The tightest first: others that overlap it have some of the hem, too.
     let detour = |bite: &Bite| bite.length / bite.mouth.max(f64::MIN_POSITIVE);
     found.sort_by(|a, b| detour(b).total_cmp(&detour(a)).then(a.from.cmp(&b.from)));
+    found.extend(torn_corners(&line, mesh, rim, &mut steps)?);
     let mut apart: Vec<Bite> = Vec::new();
     for bite in found {
         steps.take(PAIR_WORK * (1 + apart.len() as u64))?;
-        if apart.iter().all(|other| !line.overlap(&bite, other)) {
+        if apart
+            .iter()
+            .all(|other| !bite.overlaps(other, line.vertices))
+        {
             apart.push(bite);
         }
     }
@@ -128,74 +142,7 @@ impl HemRule {
     }
 }
 
-/// A loop laid flat, three times around, so that a stretch that starts in the middle round may run over its first vertex, and the hem before it, too.
-/// Rounds differ by the loop's turning.
-struct FlatLine {
-    /// The loop's length.
-    length: f64,
-    /// Its mean edge.
-    edge: f64,
-    /// How many vertices it has.
-    vertices: usize,
-    /// Per vertex, three times around and once more: its place, and the length up to it.
-    places: Vec<(Vec2, f64)>,
-    /// Per vertex, three times around and once more: the turning of all vertices before it, radians.
-    turned: Vec<f64>,
-    /// Vertices at about equal distances, once around.
-    samples: Vec<usize>,
-}
-
 impl FlatLine {
-    fn of(mesh: &TriMesh, topology: &Topology, rim: &BoundaryLoop) -> FlatLine {
-        let n = rim.vertices.len();
-        let at = |k: usize| mesh.positions[rim.vertices[k % n].index()];
-        let turns: Vec<f64> = (rim.vertices.iter())
-            .map(|v| PI - inner_angle(mesh, topology, *v))
-            .collect();
-        let (mut place, mut passed, mut heading) = (Vec2::zeros(), 0.0, 0.0_f64);
-        let mut places = Vec::with_capacity(3 * n + 1);
-        let (mut turned, mut turning) = (Vec::with_capacity(3 * n + 1), 0.0);
-        for k in 0..=3 * n {
-            places.push((place, passed));
-            turned.push(turning);
-            turning += turns[k % n];
-            heading = (heading + turns[k % n]) % TAU;
-            let edge = (at(k + 1) - at(k)).norm();
-            place += Vec2::new(heading.cos(), heading.sin()) * edge;
-            passed += edge;
-        }
-        let length = places[n].1;
-        let count = n.min(SAMPLES);
-        let mut samples: Vec<usize> = (0..count)
-            .map(|s| {
-                let wanted = length * s as f64 / count as f64;
-                places
-                    .partition_point(|(_, passed)| *passed < wanted)
-                    .min(n - 1)
-            })
-            .collect();
-        samples.dedup();
-        FlatLine {
-            length,
-            edge: length / n as f64,
-            vertices: n,
-            places,
-            turned,
-            samples,
-        }
-    }
-
-    /// The vertex of a sample, from the middle round on.
-    fn sample(&self, s: usize) -> usize {
-        let count = self.samples.len();
-        self.samples[s % count] + (1 + s / count) * self.vertices
-    }
-
-    /// The length from one sample to another.
-    fn length_of(&self, stretch: &Range<usize>) -> f64 {
-        self.places[self.sample(stretch.end)].1 - self.places[self.sample(stretch.start)].1
-    }
-
     /// The bite that a stretch from one sample to another is, if it is one.
     fn bite(&self, stretch: &Range<usize>) -> Option<Bite> {
         let (from, to) = (self.sample(stretch.start), self.sample(stretch.end));
@@ -242,40 +189,8 @@ impl FlatLine {
             length,
             mouth,
             depth,
+            corner: None,
         })
-    }
-
-    /// How the hems beside a stretch turn over this length on each side, radians a scene unit; infinite where they are not smooth.
-    fn turning_beside(&self, from: usize, to: usize, reach: f64) -> f64 {
-        if self.hem(from, -reach).is_none() || self.hem(to, reach).is_none() {
-            return f64::INFINITY;
-        }
-        let place = |passed: f64| self.places.partition_point(|(_, p)| *p < passed);
-        let first = place(self.places[from].1 - reach);
-        let last = place(self.places[to].1 + reach).min(3 * self.vertices);
-        // The corners of the stretch do not count.
-        let turned = |from: usize, to: usize| self.turned[to.max(from + 1)] - self.turned[from + 1];
-        (turned(first, from) + turned(to, last)) / (2.0 * reach)
-    }
-
-    /// The direction of the hem over this length after a vertex, before it where the length is negative; `None` where
-    /// the hem is not smooth.
-    fn hem(&self, vertex: usize, reach: f64) -> Option<Vec2> {
-        let (place, passed) = self.places[vertex];
-        let end = self.places.partition_point(|(_, p)| *p < passed + reach);
-        let (other, at) = *self.places.get(end)?;
-        let line = (other - place) * reach.signum();
-        let (chord, length) = (line.norm(), (at - passed).abs());
-        (chord > 0.0 && length < LARGEST_WAVE * chord).then(|| line / chord)
-    }
-
-    /// Whether two bites have a stretch of the loop in common.
-    fn overlap(&self, a: &Bite, b: &Bite) -> bool {
-        let within = |bite: &Bite, vertex: usize| {
-            let ahead = |to: usize| (to + self.vertices - bite.from) % self.vertices;
-            ahead(vertex) <= ahead(bite.to)
-        };
-        within(a, b.from) || within(a, b.to) || within(b, a.from)
     }
 }
 
@@ -283,8 +198,8 @@ impl FlatLine {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use std::f64::consts::PI;
 
-    use darn_geometry::mesh::Vec3;
     use darn_geometry::mesh::loops::{LoopKind, boundary_loops};
     use darn_geometry::mesh::shapes::{sheet, tube};
     use darn_geometry::mesh::weld::weld;

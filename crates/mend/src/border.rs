@@ -29,40 +29,37 @@ pub fn candidates(
     welded: &WeldedScan,
     budget: &Budget,
 ) -> Result<Vec<v1::BorderCandidate>, Exhausted> {
-    let place = |rim: &BoundaryLoop, k: usize| -> Vec<f64> {
-        welded.rim_position(rim, k).iter().copied().collect()
-    };
+    let place = |rim: &BoundaryLoop, k: usize| <[f64; 3]>::from(welded.rim_position(rim, k));
     let bites = all_bites(welded, budget)?.into_iter();
-    let bites = bites.map(|(rim, bite)| v1::BorderCandidate {
-        r#loop: rim.id.0,
-        length: bite.length,
-        mouth: bite.mouth,
-        depth: bite.depth,
-        border: Some(v1::Border {
+    let bites = bites.map(|(rim, bite)| {
+        let border = Border::Line {
             from: place(rim, bite.from),
             to: place(rim, bite.to),
-            ..v1::Border::default()
-        }),
-        facing_loop: None,
+            along: bite.corner.into_iter().map(<[f64; 3]>::from).collect(),
+        };
+        v1::BorderCandidate {
+            r#loop: rim.id.0,
+            length: bite.length,
+            mouth: bite.mouth,
+            depth: bite.depth,
+            border: Some(border.into()),
+            facing_loop: None,
+        }
     });
     let rims: Vec<&BoundaryLoop> = borders(welded).collect();
     let tears = tears(welded, &rims, budget)?.into_iter();
     let tears = tears.map(|tear| {
-        let [own, facing] = tear.edges;
+        let [own, facing] = &tear.edges;
+        let border = Border::Tear(tear.edges.each_ref().map(|edge| TornEdge {
+            from: place(edge.rim, edge.from),
+            to: place(edge.rim, edge.to),
+        }));
         v1::BorderCandidate {
             r#loop: own.rim.id.0,
             length: own.length,
             mouth: tear.gap,
             depth: 0.0,
-            border: Some(v1::Border {
-                from: place(own.rim, own.from),
-                to: place(own.rim, own.to),
-                facing: Some(v1::TornEdge {
-                    from: place(facing.rim, facing.from),
-                    to: place(facing.rim, facing.to),
-                }),
-                ..v1::Border::default()
-            }),
+            border: Some(border.into()),
             facing_loop: Some(facing.rim.id.0),
         }
     });
@@ -319,15 +316,16 @@ fn closings_of<'a>(
     let (ends, along) = match border {
         Border::Auto => {
             let found = all_bites(whole, budget)?.into_iter();
-            let stretch = |(rim, bite): (&'a BoundaryLoop, Bite)| Stretch {
-                rim,
-                from: bite.from,
-                edges: ahead(rim, bite.from, bite.to),
+            let closing = |(rim, bite): (&'a BoundaryLoop, Bite)| {
+                let stretch = Stretch {
+                    rim,
+                    from: bite.from,
+                    edges: ahead(rim, bite.from, bite.to),
+                };
+                Closing::Stretch(stretch, bite.corner.into_iter().collect())
             };
-            let all: Vec<Closing> = found
-                .map(|bite| Closing::Stretch(stretch(bite), Vec::new()))
-                .collect();
-            let detail = "no bite or rip was found at the cloth's own edge; name its ends by `from` and `to`";
+            let all: Vec<Closing> = found.map(closing).collect();
+            let detail = "no bite, rip or torn corner was found at the cloth's own edge; name its ends by `from` and `to`";
             return Ok(match all.is_empty() {
                 true => Err(detail.to_owned()),
                 false => Ok(all),

@@ -32,6 +32,7 @@ mod edit;
 mod error;
 mod fair_hole;
 mod fill_hole;
+mod flat_line;
 mod flat_region;
 mod formed_scan;
 mod hem_strip;
@@ -76,6 +77,7 @@ mod texture_cloth;
 mod texture_images;
 mod texture_patch;
 mod timings;
+mod torn_corners;
 mod welded_scan;
 mod without_noise;
 

@@ -19,7 +19,7 @@ pub enum HoleSelector {
 /// A stretch of the cloth's own edge; points in scene space.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Border {
-    /// Every bite and rip that is found.
+    /// Every bite, rip and torn corner that is found.
     Auto,
     /// The way into the cloth along the edge from one place to another.
     Line {
@@ -62,6 +62,32 @@ pub enum Cut {
     },
     /// The triangles that touch one of these loops.
     Rims(Vec<u32>),
+}
+
+impl From<Border> for v1::Border {
+    fn from(border: Border) -> v1::Border {
+        match border {
+            Border::Auto => v1::Border {
+                auto: true,
+                ..v1::Border::default()
+            },
+            Border::Line { from, to, along } => v1::Border {
+                from: from.to_vec(),
+                to: to.to_vec(),
+                along: along.iter().map(|p| list(p)).collect(),
+                ..v1::Border::default()
+            },
+            Border::Tear([own, facing]) => v1::Border {
+                from: own.from.to_vec(),
+                to: own.to.to_vec(),
+                facing: Some(v1::TornEdge {
+                    from: facing.from.to_vec(),
+                    to: facing.to.to_vec(),
+                }),
+                ..v1::Border::default()
+            },
+        }
+    }
 }
 
 impl From<Cut> for v1::Cut {
