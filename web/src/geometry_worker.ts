@@ -18,7 +18,7 @@ scope.onmessage = ({ data }) => {
   try {
     if (data.job === 'boundary') {
       const lines = boundaryLines(positions, triangles);
-      const buffers = lines.map(({ points }) => points.buffer);
+      const buffers = lines.flatMap(({ points, angles }) => [points.buffer, angles.buffer]);
       scope.postMessage({ id, lines }, buffers as ArrayBuffer[]);
     } else if (data.job === 'numbers') {
       const numbers = vertexNumbers(positions, triangles, weld(positions));

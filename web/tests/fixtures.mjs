@@ -82,6 +82,21 @@ export function sheetWithBite() {
   return sheetGlb(40, (i, j) => (i - 19.5) ** 2 / 16 + j ** 2 / 36 < 1);
 }
 
+/** A sheet of 40 squares with a round neck of six squares, and a bite that leads from the neck to near the side: its edge is longer than the rest of the neck's. */
+export function sheetWithBittenNeck() {
+  return sheetGlb(40, (i, j) => Math.hypot(i - 19.5, j - 10) < 3 || (Math.abs(i - 19.5) < 2 && j > 10 && j < 34));
+}
+
+/** A sheet with a hole, and a piece of which only the outermost squares are left: cloth that fills it would be a guess. */
+export function sheetAndFrame() {
+  return sheetGlb(60, (i, j) => {
+    if (j >= 30 || (i >= 28 && i < 32)) {
+      return true;
+    }
+    return i < 28 ? Math.hypot(i - 13.5, j - 14.5) < 4.3 : i > 32 && i < 59 && j > 0 && j < 29;
+  });
+}
+
 /** A sheet of 40 squares torn in two: a gap of three squares, its edges ragged. */
 export function sheetTornInTwo() {
   return sheetGlb(40, (i, j) => Math.abs(i - 19.5 - (j % 2)) < 1.6);

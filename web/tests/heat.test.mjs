@@ -1,4 +1,4 @@
-// Laws of the heat maps, of cuts and of stretches of border, which need no browser.
+// Laws of the heat maps and of cuts, which need no browser.
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
@@ -12,7 +12,6 @@ const { heatColors, ownColors, scaleOf } = await load('scene/heat_colors.ts');
 const { holeInWords } = await load('model/report.ts');
 const { Middles, indexWithout } = await load('scene/cut_faces.ts');
 const { AnchorMap } = await load('model/anchor_map.ts');
-const { stretchBetween } = await load('scene/border_stretch.ts');
 
 /** A sheet of squares bent to a surface; every triangle with vertices of its own, as at texture seams. */
 function bent(side, place) {
@@ -151,39 +150,6 @@ test('triangles are taken out by their middles, and no others', () => {
   }
   assert.deepEqual(missing, gone);
   assert.equal(indexWithout(Float64Array.from(positions), triangles, new Middles([9, 9, 9], 1e-6)), undefined);
-});
-
-test('a stretch of border goes the shorter way between the nearest vertices', () => {
-  const points = Float32Array.from(
-    [
-      [0, 0],
-      [1, 0],
-      [2, 0],
-      [2, 1],
-      [2, 2],
-      [1, 2],
-      [0, 2],
-      [0, 1],
-    ].flatMap(([x, y]) => [x, y, 0]),
-  );
-  const xy = (stretch) => stretch.map(([x, y]) => [x, y]);
-  const lines = [{ points }, { points: points.map((x) => x + 50) }];
-  const stretch = stretchBetween(lines, { from: [0.1, 0.9, 0], to: [1, -0.2, 0] });
-  assert.deepEqual(xy(stretch), [
-    [0, 1],
-    [0, 0],
-    [1, 0],
-  ]);
-  const ends = { from: [0, 1, 0], to: [2, 1, 0] };
-  for (const [y, way] of [
-    [3, [2, 2, 2]],
-    [-1, [0, 0, 0]],
-  ]) {
-    const facing = { from: [2, y, 0], to: [0, y, 0] };
-    const nearer = stretchBetween(lines, ends, facing).map(([, height]) => height);
-    assert.deepEqual(nearer, [1, ...way, 1]);
-  }
-  assert.deepEqual(stretchBetween([], { from: [0, 0, 0], to: [0, 0, 0] }), []);
 });
 
 test('a map grows by its pieces until it has every cell', () => {

@@ -415,3 +415,7 @@ fn torn<'a>(whole: &WeldedScan, edges: [Stretch<'a>; 2]) -> Result<Closing<'a>, 
         None => Ok(Closing::Tear(edges)),
     }
 }
+
+#[cfg(test)]
+#[path = "border_tests.rs"]
+mod tests;

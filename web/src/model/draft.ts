@@ -222,20 +222,6 @@ export function withoutFacing({ from, to }: BorderDraft): BorderDraft {
   return { kind: 'border', from, to, along: [] };
 }
 
-/** The lines that new hems follow, roughly: from the stretch's one end to its other, or from each end to the nearer one of the edge that faces it. */
-export function newHems({ from, to, along, facing }: BorderDraft): readonly (readonly Vec3[])[] {
-  if (facing === undefined) {
-    return [[from, ...along, to]];
-  }
-  const straight = distance(from, facing.from) + distance(to, facing.to);
-  const crossed = distance(from, facing.to) + distance(to, facing.from);
-  const [first, second] = straight <= crossed ? [facing.from, facing.to] : [facing.to, facing.from];
-  return [
-    [from, first],
-    [to, second],
-  ];
-}
-
 function distance(a: Vec3, b: Vec3): number {
   return Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }

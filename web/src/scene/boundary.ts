@@ -3,6 +3,8 @@
 /** A closed line: `x, y, z` of each vertex in order. */
 export interface BoundaryLine {
   readonly points: Float32Array;
+  /** Per vertex the sum of its triangles' angles there, radians. */
+  readonly angles: Float32Array;
   /** Mean of the line, weighted by edge length. */
   readonly centroid: readonly [number, number, number];
   readonly length: number;
@@ -16,7 +18,44 @@ export interface BoundaryLine {
  */
 export function boundaryLines(positions: Float32Array, triangles: Uint32Array): BoundaryLine[] {
   const welded = weld(positions);
-  return loopsOf(boundaryEdges(welded, triangles, positions.length / 3)).map((loop) => lineOf(positions, loop));
+  const loops = loopsOf(boundaryEdges(welded, triangles, positions.length / 3));
+  const angles = anglesAt(new Set(loops.flat()), { positions, welded, triangles });
+  return loops.map((loop) => ({
+    ...lineOf(positions, loop),
+    angles: Float32Array.from(loop, (at) => angles[at] ?? 0),
+  }));
+}
+
+/** Per vertex the sum of the angles of its triangles, radians; 0 for vertices that are not asked for. */
+function anglesAt(
+  asked: ReadonlySet<number>,
+  { positions, welded, triangles }: Record<'positions', Float32Array> & Record<'welded' | 'triangles', Uint32Array>,
+): Float32Array {
+  const isAsked = new Uint8Array(positions.length / 3);
+  asked.forEach((vertex) => (isAsked[vertex] = 1));
+  const sums = new Float32Array(positions.length / 3);
+  const side = (from: number, to: number): number[] =>
+    [0, 1, 2].map((axis) => (positions[3 * to + axis] as number) - (positions[3 * from + axis] as number));
+  for (let face = 0; face + 2 < triangles.length; face += 3) {
+    const corners = [0, 1, 2].map((corner) => welded[triangles[face + corner] as number] as number);
+    for (let corner = 0; corner < 3; corner += 1) {
+      const vertex = corners[corner] as number;
+      if (isAsked[vertex] === 1) {
+        const [a, b] = [1, 2].map((step) => side(vertex, corners[(corner + step) % 3] as number)) as [
+          number[],
+          number[],
+        ];
+        const cosine = dot(a, b) / Math.sqrt(dot(a, a) * dot(b, b));
+        sums[vertex] =
+          (sums[vertex] as number) + (Number.isNaN(cosine) ? 0 : Math.acos(Math.min(Math.max(cosine, -1), 1)));
+      }
+    }
+  }
+  return sums;
+}
+
+function dot(a: readonly number[], b: readonly number[]): number {
+  return a.reduce((sum, value, axis) => sum + value * (b[axis] as number), 0);
 }
 
 /** For each vertex, the first one at its position: by a hash table with open addressing over the positions' bits. */
@@ -113,7 +152,7 @@ function loopsOf(following: Map<number, number[]>): number[][] {
   return loops.filter((loop) => loop.length > 2);
 }
 
-function lineOf(positions: Float32Array, loop: readonly number[]): BoundaryLine {
+function lineOf(positions: Float32Array, loop: readonly number[]): Omit<BoundaryLine, 'angles'> {
   const points = new Float32Array(loop.flatMap((vertex) => [...positions.subarray(3 * vertex, 3 * vertex + 3)]));
   const centroid: [number, number, number] = [0, 0, 0];
   let length = 0;

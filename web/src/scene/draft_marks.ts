@@ -1,10 +1,11 @@
 /** What is drawn for the gesture that is being made. */
-import type { Uv } from '../client.js';
+import type { Uv, Vec3 } from '../client.js';
 import { type ClothPoint, locate, normalOf, positionOf } from '../model/cloth.js';
-import { type ClothDraft, type EdgeEnds, type MakingDraft, handlesOf, isMaking, newHems } from '../model/draft.js';
+import { type BorderDraft, type ClothDraft, type MakingDraft, handlesOf, isMaking } from '../model/draft.js';
 import type { Editor } from '../model/editor.js';
 import type { Patch } from '../model/scan_session.js';
 import { Vector3 } from '../vendor.js';
+import type { BorderLines } from './border_stretch.js';
 import { type Marked, circle } from './marks.js';
 
 /** Cells of a grid's side. */
@@ -25,8 +26,8 @@ export interface Waiting {
   readonly border: Vector3 | undefined;
   /** The disk that a twist would turn. */
   readonly disk: Disk | undefined;
-  /** The way along the cloth's own edge. */
-  stretch(edge: EdgeEnds, facing?: EdgeEnds): Vector3[];
+  /** What a stretch of border will be mended as. */
+  lines(draft: BorderDraft): BorderLines;
 }
 
 /**
@@ -60,7 +61,7 @@ function diskMarks({ point, radius }: Disk, now: Patch, spacing: number): Marked
   return { handles: [center], ring, disk: { center, ring } };
 }
 
-function makingMarks(draft: MakingDraft, { stretch }: Waiting): Marked {
+function makingMarks(draft: MakingDraft, { lines }: Waiting): Marked {
   switch (draft.kind) {
     case 'cut': {
       const center = new Vector3(...draft.center);
@@ -72,12 +73,14 @@ function makingMarks(draft: MakingDraft, { stretch }: Waiting): Marked {
     }
     case 'border': {
       const handles = handlesOf(draft).map((point) => new Vector3(...point));
-      const lines = newHems(draft).map((line) => line.map((point) => new Vector3(...point)));
-      const { facing } = draft;
-      const stretches = facing === undefined ? [stretch(draft)] : [stretch(draft, facing), stretch(facing, draft)];
-      return { handles, stretches, dashes: lines };
+      const { stretches, hems } = lines(draft);
+      return { handles, stretches: stretches.map(drawn), dashes: hems.map(drawn) };
     }
   }
+}
+
+function drawn(line: readonly Vec3[]): Vector3[] {
+  return line.map((point) => new Vector3(...point));
 }
 
 function draftMarks(draft: ClothDraft, before: Patch, now: Patch, spacing: number): Marked {

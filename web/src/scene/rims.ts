@@ -1,8 +1,9 @@
 /** Boundary loops as lines: the kind gives the colour and whether a line is solid, dashed or dotted. Chosen ones are wider. */
 import type { Loop } from '../client.js';
-import { isHole, styleOf } from '../model/loops.js';
+import { styleOf } from '../model/loops.js';
 import { Box3, Group, Line2, LineGeometry, LineMaterial, Vector3 } from '../vendor.js';
 import type { BoundaryLine } from './boundary.js';
+import { ClothEdge } from './cloth_edge.js';
 
 /** Width of a line in CSS pixels. */
 const WIDTH = { chosen: 4, other: 2 };
@@ -19,20 +20,23 @@ export class Rims {
   readonly group = new Group();
   private readonly lines = new Map<number, Line2>();
   private readonly views = new Map<number, RimView>();
-  /** Those of the cloth's own edge: of loops that are no holes. */
-  readonly borders: readonly BoundaryLine[];
+  /** The loops as edges of the cloth that can be mended, of whatever kind: a bitten opening may be taken for a hole. */
+  readonly edges: readonly ClothEdge[];
+  /** The vertices of all of them. */
+  readonly vertices: readonly Vector3[];
 
   /**
    * @param lines - The line of each loop by its id.
    * @param size - The scan's size, for the length of dashes.
    */
   constructor(loops: readonly Loop[], lines: ReadonlyMap<number, BoundaryLine>, size: number) {
-    this.borders = loops.flatMap((loop) => (isHole(loop) ? [] : (lines.get(loop.id ?? 0) ?? [])));
-    for (const loop of loops) {
+    const found = loops.flatMap((loop) => {
       const line = lines.get(loop.id ?? 0);
-      if (line === undefined) {
-        continue;
-      }
+      return line === undefined ? [] : [{ loop, line }];
+    });
+    this.edges = found.map(({ loop, line }) => new ClothEdge(line, loop));
+    this.vertices = found.flatMap(({ line }) => verticesOf(line));
+    for (const { loop, line } of found) {
       const style = styleOf(loop.kind ?? '');
       const dash = size * (style.line === 'dotted' ? 0.003 : 0.012);
       const material = new LineMaterial({
@@ -76,8 +80,12 @@ export class Rims {
   }
 }
 
-function viewOf({ points }: BoundaryLine, kind: string | undefined): RimView {
-  const corners = Array.from({ length: points.length / 3 }, (_, at) => new Vector3().fromArray(points, 3 * at));
+function verticesOf({ points }: BoundaryLine): Vector3[] {
+  return Array.from({ length: points.length / 3 }, (_, at) => new Vector3().fromArray(points, 3 * at));
+}
+
+function viewOf(line: BoundaryLine, kind: string | undefined): RimView {
+  const corners = verticesOf(line);
   const bounds = new Box3().setFromPoints(corners);
   const center = bounds.getCenter(new Vector3());
   const front = new Vector3();

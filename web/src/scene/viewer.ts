@@ -14,9 +14,9 @@ import {
   type Texture,
   Vector3,
 } from '../vendor.js';
-import type { EdgeEnds } from '../model/draft.js';
+import type { BorderDraft } from '../model/draft.js';
 import { Aim } from './aim.js';
-import { stretchBetween, pointsOf } from './border_stretch.js';
+import { type BorderLines, borderLines } from './border_stretch.js';
 import { linesOfLoops } from './boundary.js';
 import { type Marked, Marks } from './marks.js';
 import { PatchModel, type Surface, TINT, blendedMaterial, plainlyColoured, readSurfaces } from './patch_model.js';
@@ -201,20 +201,14 @@ export class Viewer {
     }
   }
 
-  /** The vertex of the cloth's own edge that is nearest to a point of the window, if one is near. */
+  /** The vertex of the cloth's own edge that is drawn nearest to a point of the window, if one is near. */
   nearestOfBorder(clientX: number, clientY: number): Vector3 | undefined {
-    const borders = this.rims?.borders ?? [];
-    return this.aim.nearestOf(
-      borders.flatMap(pointsOf).map((point) => new Vector3(...point)),
-      { x: clientX, y: clientY },
-      40,
-    );
+    return this.aim.nearestOf(this.rims?.vertices ?? [], { x: clientX, y: clientY }, 40)?.clone();
   }
 
-  /** The way along the cloth's own edge between its vertices nearest to two points: the shorter one, or that along the edge that faces it. */
-  stretchBetween(edge: EdgeEnds, facing?: EdgeEnds): Vector3[] {
-    const stretch = stretchBetween(this.rims?.borders ?? [], edge, facing);
-    return stretch.map((point) => new Vector3(...point));
+  /** Which way along the cloth's own edge the service will mend, and where the new hem will be. */
+  borderLines(draft: BorderDraft): BorderLines {
+    return borderLines(this.rims?.edges ?? [], draft);
   }
 
   /** Changes how things are drawn. */

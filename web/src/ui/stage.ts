@@ -108,7 +108,7 @@ export class Stage extends Panel {
         cloth: this.gestures?.waitingPoint,
         border: this.gestures?.waitingEnd,
         disk: this.gestures?.disk,
-        stretch: (edge, facing) => this.viewer?.stretchBetween(edge, facing) ?? [],
+        lines: (draft) => this.viewer?.borderLines(draft) ?? { stretches: [], hems: [] },
       }),
       this.editor.isAsking ? ANSWER : 0,
     );
