@@ -1,11 +1,11 @@
-// Borders: that what is drawn is what is mended, in Node, then in a real browser with a real darn.
+// Borders, openings and doubts: that what is drawn and said is what is mended, in Node, then in a real browser with a real darn.
 
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
 import { repository } from './browser.mjs';
-import { sheetWithBittenNeck } from './fixtures.mjs';
+import { sheetAndFrame, sheetGlb, sheetWithBite, sheetWithBittenNeck } from './fixtures.mjs';
 import { complaints, constraintsOf, drop, editorTests, saved, stateless } from './shared.mjs';
 import { load } from './sources.mjs';
 
@@ -124,5 +124,84 @@ inEditor(
     const { holes } = await constraintsOf(editor);
     const { bytes } = await saved(editor, page);
     assert.ok(bytes.equals(await stateless(service, JSON.stringify({ holes }), scan)));
+  },
+);
+
+inEditor('a bite is mended where it is listed, and not offered again until it is undone', async (editor, page) => {
+  await drop(page, 'bite.glb', sheetWithBite());
+  await page
+    .getByText('bite.glb is open: 0 holes in 1 boundary loop, and 1 bite, rip or tear at the border.')
+    .waitFor();
+  await page.getByText('What is bitten or torn at its border is listed below.').waitFor();
+  await editor.idle();
+  const mend = editor.button('Mend Bite or rip 1');
+  await mend.click();
+  await page.getByText('Bite or rip 1 ✓ mended').waitFor();
+  await editor.idle();
+  assert.equal(await mend.count(), 0);
+  // No stretch is drawn that the button of the tool would mend.
+  await editor.tool('e');
+  assert.equal(await editor.button('Mend up to the new hem').isDisabled(), true);
+  assert.equal(await editor.model((it) => it.draft), undefined);
+  assert.deepEqual(await complaints(page), []);
+  // By hand it is refused in words of the page.
+  await page.evaluate(() => {
+    const { editor: it } = document.querySelector('darn-editor');
+    const [{ border }] = it.scan.candidates;
+    it.preview({ kind: 'border', from: border.from, to: border.to, along: [] });
+  });
+  await editor.button('Mend up to the new hem').click();
+  await editor.idle();
+  assert.match(await page.getByRole('alert').innerText(), /^Border: overlaps what/);
+  await editor.button('Undo').click();
+  await editor.idle();
+  assert.equal(await mend.isEnabled(), true);
+});
+
+inEditor('cloth that is no plausible one is left open with its reason, and accepted', async (editor, page) => {
+  await drop(page, 'frame.glb', sheetAndFrame());
+  await page.getByText('Holes (2)').waitFor();
+  await editor.idle();
+  const [left] = await editor.model((it) => it.scan.loops.filter(({ kind, length }) => kind === 'HOLE' && length > 3));
+  await editor.button('Mend 2 holes').click();
+  await editor.idle();
+  await page.getByText('1 filled', { exact: false }).first().waitFor();
+  await page.getByText('1 hole left open; the list says why.').waitFor();
+  const why = page.locator('darn-holes li', { hasText: `Hole ${left.id}` }).locator('.why', { hasText: 'Left open' });
+  const text = await why.innerText();
+  assert.match(text, /^Left open: its patch is no plausible cloth: .* as much cloth as the piece/);
+  assert.doesNotMatch(text, /acceptDoubtful|hole \d/);
+  await editor.keep('doubtful-left');
+  await page.getByLabel('Mend with doubtful cloth, too').check();
+  await editor.button('Mend 2 holes').click();
+  await editor.idle();
+  await page.getByText('1 with doubtful cloth.').waitFor();
+  assert.equal(await page.getByText('✓ mended').count(), 2);
+  await page.locator('darn-holes').getByText('Doubtful: it would have', { exact: false }).waitFor();
+  assert.equal((await constraintsOf(editor)).acceptDoubtful, true);
+  assert.deepEqual(await complaints(page), []);
+  await editor.keep('doubtful-accepted');
+  await editor.button('Undo').click();
+  await editor.idle();
+  assert.equal(await page.getByText('✓ mended').count(), 1);
+});
+
+inEditor(
+  'it is said of what kind a loop is, how sure that is, what speaks for it and what against',
+  async (editor, page) => {
+    await drop(
+      page,
+      'sheet.glb',
+      sheetGlb(30, (i, j) => Math.hypot(i - 14.5, j - 14.5) < 4.3),
+    );
+    await page.getByText('Holes (1)').waitFor();
+    await page.getByText(/^\d+ % sure that it is a hole$/).click();
+    const reasons = await page.locator('darn-holes details p').allInnerTexts();
+    const { evidence } = await editor.model((it) => it.scan.loops.find(({ kind }) => kind === 'HOLE'));
+    assert.equal(reasons.length, evidence.length);
+    assert.ok(evidence.some(({ weight }) => weight > 0) && evidence.some(({ weight }) => weight < 0));
+    for (const { weight, reason } of evidence) {
+      assert.ok(reasons.includes(`${weight > 0 ? 'But' : 'As'} ${reason}`), `${weight} ${reason}`);
+    }
   },
 );

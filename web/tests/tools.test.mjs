@@ -198,7 +198,7 @@ inEditor('cloth that is torn in two is shown, joined, and its edges can be typed
   await page.getByText('Bites, rips and tears at the border (1)').waitFor();
   await editor.idle();
   const open = await editor.picture();
-  await page.getByRole('button', { name: 'Tear 1' }).click();
+  await editor.button('Tear 1').click();
   await editor.idle();
   assert.ok((await editor.difference(open, await editor.picture())) > 0.0005, 'both edges are seen');
   await editor.keep('tear-shown');
@@ -238,7 +238,7 @@ inEditor(
     await page.getByText('Bites, rips and tears at the border (1)').waitFor();
     await editor.idle();
     const open = await editor.picture();
-    await page.getByRole('button', { name: 'Bite or rip 1' }).click();
+    await editor.button('Bite or rip 1').click();
     await editor.idle();
     assert.ok((await editor.difference(open, await editor.picture())) > 0.0005, 'the stretch is seen');
     await editor.keep('border-stretch');

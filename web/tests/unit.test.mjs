@@ -294,9 +294,23 @@ test('every fault of a refused request is told once, with its place in words', (
   const twist = { pointer: '/edits/0/twist/radius', detail: '2 is above 1' };
   assert.equal(
     told('invalid_constraints', '/edits/0/twist/radius: 2 is above 1', twist),
-    '/edits/0/twist/radius: 2 is above 1.',
+    'Gesture 1, twist radius: 2 is above 1.',
   );
-  assert.equal(told('invalid_constraints', 'a field is wrong', twist), 'A field is wrong.\nGesture 1: 2 is above 1.');
+  assert.equal(
+    told('invalid_constraints', 'a field is wrong', twist),
+    'A field is wrong.\nGesture 1, twist radius: 2 is above 1.',
+  );
+  const border = { pointer: '/holes/1/border', detail: '`from` lies 9 from the edge' };
+  const cut = { pointer: '/holes/0/cut/radius', detail: 'is 0' };
+  assert.equal(
+    told(
+      'constraints_misfit',
+      '2 constraint(s) do not fit this scan: /holes/1/border: `from` lies 9 from the edge; /holes/0/cut/radius: is 0',
+      border,
+      cut,
+    ),
+    'Border: `from` lies 9 from the edge.\nCut out, radius: is 0.',
+  );
   assert.equal(told('invalid_constraints', 'wrong', { detail: 'no JSON' }), 'Wrong.\nThe request: no JSON.');
   assert.equal(describeError(problemOf(400, null, '{}')), 'The service answered with status 400.');
 });

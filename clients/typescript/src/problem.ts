@@ -76,20 +76,37 @@ function problemInWords({ code, message, fields }: ProblemError): string {
     const faults = fields.map(({ pointer = '', detail = '' }) => sentence(`${placeInWords(pointer)}: ${detail}`));
     return [...faults, 'Move the point nearer to the cloth, or make the anchor soft.'].join('\n');
   }
-  // Most details list the faults already.
+  const inWords = ({ pointer = '', detail = '' }: FieldFault): string =>
+    sentence(`${placeInWords(pointer)}: ${detail}`);
+  // Most details list the faults already, by their pointers.
+  if (fields.length > 0 && fields.every(({ pointer = '', detail = '' }) => message.includes(`${pointer}: ${detail}`))) {
+    return fields.map(inWords).join('\n');
+  }
   const others = fields.filter(({ detail = '' }) => !message.includes(detail));
-  const faults = others.map(({ pointer = '', detail = '' }) => sentence(`${placeInWords(pointer)}: ${detail}`));
-  return [sentence(message), ...faults].join('\n');
+  return [sentence(message), ...others.map(inWords)].join('\n');
 }
 
-/** The first words of a JSON pointer into constraints, counted from 1 as people do. */
+/** A JSON pointer into constraints as a person calls its place, counted from 1: `Gesture 1, twist radius`. */
 function placeInWords(pointer: string): string {
-  const [, list = '', index = ''] = pointer.split('/');
+  const [, list = '', index = '', ...members] = pointer.split('/');
+  if (!/^\d+$/.test(index)) {
+    return pointer || 'The request';
+  }
+  if (list === 'holes') {
+    // The numbers of entries say nothing to who has clicked them together.
+    const [made = '', ...others] = members;
+    const name = new Map([
+      ['border', 'Border'],
+      ['cut', 'Cut out'],
+    ]).get(made);
+    return name === undefined ? pointer : [name, ...others].join(', ');
+  }
   const name = new Map([
     ['anchors', 'Anchor'],
     ['edits', 'Gesture'],
   ]).get(list);
-  return name !== undefined && /^\d+$/.test(index) ? `${name} ${Number(index) + 1}` : pointer || 'The request';
+  const member = members.length > 0 ? `, ${members.join(' ')}` : '';
+  return name === undefined ? pointer : `${name} ${Number(index) + 1}${member}`;
 }
 
 function sentence(text: string): string {

@@ -142,6 +142,18 @@ export function bordering({ border }: BorderCandidate): BorderDraft {
   return { kind: 'border', ...ends(border ?? {}), along: [], ...(facing && { facing: ends(facing) }) };
 }
 
+/** The bites, rips and tears of a scan that are not among what is made. */
+export function unmade(candidates: readonly BorderCandidate[], made: readonly MadeHole[]): BorderCandidate[] {
+  return candidates.filter((candidate) => !isMade(candidate, made));
+}
+
+/** Whether a bite, a rip or a tear is mended by something that is made. */
+export function isMade(candidate: BorderCandidate, made: readonly MadeHole[]): boolean {
+  const own = JSON.stringify(madeBy(bordering(candidate)));
+  const isTear = candidate.border?.facing !== undefined;
+  return made.some((entry) => ('border' in entry && entry.border.auto ? !isTear : JSON.stringify(entry) === own));
+}
+
 /** A ball around the edge of the largest hole, a polygon without corners, or the first place at the border that was found. */
 export function firstMaking(kind: MakingDraft['kind'], { loops, candidates }: MakingStart): MakingDraft {
   const first = firstLoop(loops);

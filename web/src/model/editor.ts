@@ -36,7 +36,7 @@ import { isFill } from './fills.js';
 import { documentOf } from './gltf_document.js';
 import { History } from './history.js';
 import { LiveDraft } from './live_draft.js';
-import { isHole } from './loops.js';
+import { foundInWords, isHole } from './loops.js';
 import { stepInWords } from './report.js';
 import { fetchedScan } from './scan_files.js';
 import { type Patch, ScanSession } from './scan_session.js';
@@ -177,8 +177,7 @@ export class Editor extends EventTarget {
       this.acceptDoubtful = false;
       this.search.forget();
       this.dropDraft();
-      const holes = this.chosen.size;
-      this.message = `${name} is open: ${holes} ${holes === 1 ? 'hole' : 'holes'} in ${loops.length} boundary loops.`;
+      this.message = `${name} is open: ${foundInWords(loops, candidates.length)}.`;
       this.dispatchEvent(new Event('opened'));
     });
   }

@@ -24,6 +24,22 @@ export function styleOf(kind: string): KindStyle {
   return STYLES.get(kind) ?? { plural: name, singular: name, color: '#862e9c', line: 'dotted' };
 }
 
+/** A kind as what a loop is: `a hole`, `an end of a sleeve`. */
+export function kindInWords(kind: string): string {
+  const name = styleOf(kind).singular.toLowerCase();
+  return `${/^[aeiou]/.test(name) ? 'an' : 'a'} ${name}`;
+}
+
+/** What was found in a scan, in a sentence without its end. */
+export function foundInWords(loops: readonly Loop[], places: number): string {
+  const count = (number: number, one: string, many: string): string => `${number} ${number === 1 ? one : many}`;
+  const holes = count(loops.filter(isHole).length, 'hole', 'holes');
+  const found = `${holes} in ${count(loops.length, 'boundary loop', 'boundary loops')}`;
+  return places === 0
+    ? found
+    : `${found}, and ${count(places, 'bite, rip or tear', 'bites, rips or tears')} at the border`;
+}
+
 /** Whether the service fills a loop unasked. */
 export function isHole(loop: Loop): boolean {
   return loop.kind === 'HOLE';

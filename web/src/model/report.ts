@@ -1,5 +1,5 @@
 /** The service's report in words. */
-import type { Confidence, HoleReport, Report } from '../client.js';
+import type { Confidence, HoleReport, Report, Skipped } from '../client.js';
 import type { Step } from './editor_state.js';
 import { fillInWords, fillName } from './fills.js';
 import { short } from './loops.js';
@@ -9,6 +9,20 @@ const NO_CHART = 'The cloth around it cannot be laid flat: a fair surface withou
 
 /** Nine of ten vertices lie within so many standard deviations of the cloth that was there. */
 const WITHIN_90 = 1.645;
+
+/** Codes of loops that are left because of what was chosen. */
+const CHOICES = new Set(['not_selected', 'excepted', 'outer_boundary', 'tube_end', 'opening']);
+
+/** The loops that were to be filled and are left open. */
+export function leftOpen(skipped: readonly Skipped[]): Skipped[] {
+  return skipped.filter(({ code = '' }) => !CHOICES.has(code));
+}
+
+/** Why a loop is left open, for who sees it and has a control to accept doubtful cloth. */
+export function reasonInWords({ id, reason = '' }: Skipped): string {
+  const said = reason.replace(`hole ${id}: `, '').replace(/; `acceptDoubtful` applies it all the same$/, '');
+  return `Left open: ${said}.`;
+}
 
 /** One sentence or two for each hole. */
 export function holeInWords(hole: HoleReport): string[] {
@@ -57,7 +71,13 @@ export function stepInWords({ label, constraints, patches, report }: Step): stri
     return textureInWords(constraints.texture, report);
   }
   const faces = patches.reduce((sum, patch) => sum + (patch.hole.patchFaces?.length ?? 0) / 3, 0);
-  return `${label}: ${patches.length} filled, ${faces.toLocaleString('en')} new triangles.`;
+  const open = leftOpen(report?.skipped ?? []).length;
+  const doubtful = (report?.holes ?? []).filter(({ doubts = [] }) => doubts.length > 0).length;
+  return [
+    `${label}: ${patches.length} filled, ${faces.toLocaleString('en')} new triangles.`,
+    ...(open > 0 ? [`${count(open, 'hole')} left open; the list says why.`] : []),
+    ...(doubtful > 0 ? [`${doubtful} with doubtful cloth.`] : []),
+  ].join(' ');
 }
 
 function stretchInWords(mean: number | undefined, most: number | undefined): string {

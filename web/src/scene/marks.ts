@@ -26,6 +26,7 @@ const RING_CORNERS = 64;
 /** The colours of what a hand holds and of what is taken away. */
 const HAND = 0x0b7285;
 const CUT = 0xc2255c;
+const LIGHT = 0xf1f3f5;
 /** The name of the ball of a cut, whose size is the scene's. */
 const BALL = 'cut';
 /** The name of the disk of a twist. */
@@ -104,6 +105,8 @@ export class Marks {
     for (const line of dashes.filter((each) => each.length > 1)) {
       const length = line.reduce((sum, point, at) => sum + point.distanceTo(line[Math.max(at - 1, 0)] ?? point), 0);
       const dash = { dashed: true, dashSize: length / 30, gapSize: length / 40 };
+      // Light below, so that it is seen on a dark page, too.
+      this.group.add(broadLine(line, { color: LIGHT, linewidth: 5 }));
       this.group.add(broadLine(line, { color: HAND, linewidth: 3, ...dash }));
     }
     for (const position of handles) {

@@ -1,15 +1,13 @@
 /** The list of boundary loops: which to fill, how long they are, why some are left as they are. */
 import type { BorderCandidate, Loop } from '../client.js';
 import type { MadeHole } from '../model/constraints.js';
-import { bordering } from '../model/draft.js';
-import { byKind, isFillable, isHole, short, styleOf } from '../model/loops.js';
+import { bordering, isMade, madeBy } from '../model/draft.js';
+import { byKind, isFillable, isHole, kindInWords, short, styleOf } from '../model/loops.js';
+import { leftOpen, reasonInWords } from '../model/report.js';
 import { type TemplateResult, css, html, nothing, svg } from '../vendor.js';
 import './fill_stepper.js';
 import { Panel } from './panel.js';
 import './texture_choice.js';
-
-/** Reasons to leave a loop that are only this list's own choice. */
-const CHOICES = new Set(['not_selected', 'excepted', 'outer_boundary', 'tube_end', 'opening']);
 
 /** The event `darn-frame` asks the picture to show the loop in `detail`. */
 export class HolesPanel extends Panel {
@@ -27,6 +25,7 @@ export class HolesPanel extends Panel {
         display: grid;
         grid-template-columns: 28px 1fr auto;
         align-items: center;
+        gap: 0 8px;
         min-height: 28px;
       }
       li button {
@@ -43,10 +42,13 @@ export class HolesPanel extends Panel {
       li.other {
         grid-template-columns: 1fr auto;
       }
+      li.place {
+        grid-template-columns: 1fr auto auto;
+      }
       li .name {
         padding: 0 10px;
       }
-      li button.back {
+      li button.own {
         border-color: var(--line);
         background: var(--surface);
       }
@@ -70,8 +72,8 @@ export class HolesPanel extends Panel {
     const holes = loops.filter(isHole).map((loop) => loop.id ?? 0);
     return html`
       <h2>Holes</h2>
-      ${byKind(loops).map(([kind, members]) => this.group(kind, members))}
-      ${holes.length === 0 ? html`<p>This scan has no holes to fill.</p>` : nothing} ${this.candidates()} ${this.made()}
+      ${holes.length === 0 ? html`<p>${noHoles(loops, scan?.candidates ?? [])}</p>` : nothing}
+      ${byKind(loops).map(([kind, members]) => this.group(kind, members))} ${this.candidates()} ${this.made()}
       ${this.doubtful()}
       <div class="row">
         <button
@@ -122,24 +124,40 @@ export class HolesPanel extends Panel {
     if (candidates.length === 0) {
       return nothing;
     }
-    const show = (candidate: BorderCandidate): void => {
-      this.editor.setTool('border');
-      this.editor.preview(bordering(candidate));
-    };
     return html`
       <h3>Bites, rips and tears at the border (${candidates.length})</h3>
       <ul aria-label="Bites, rips and tears at the border">
-        ${candidates.map((candidate, at) => {
-          const isTear = candidate.border?.facing !== undefined;
-          const inward = isTear ? `${short(candidate.length)} long` : `${short(candidate.depth)} deep`;
-          return html`
-            <li class="other">
-              <button @click=${() => show(candidate)}>${isTear ? 'Tear' : 'Bite or rip'} ${at + 1}</button>
-              <span class="quiet small">${short(candidate.mouth)} wide · ${inward}</span>
-            </li>
-          `;
-        })}
+        ${candidates.map((candidate, at) => this.candidate(candidate, at))}
       </ul>
+    `;
+  }
+
+  private candidate(candidate: BorderCandidate, at: number): TemplateResult {
+    const { step, work } = this.editor;
+    const isTear = candidate.border?.facing !== undefined;
+    const name = `${isTear ? 'Tear' : 'Bite or rip'} ${at + 1}`;
+    const inward = isTear ? `${short(candidate.length)} long` : `${short(candidate.depth)} deep`;
+    const mended = isMade(candidate, step.made);
+    const draft = bordering(candidate);
+    const show = (): void => {
+      this.editor.setTool('border');
+      if (!mended) {
+        this.editor.preview(draft);
+      }
+    };
+    const mend = (): void => void this.editor.make('Border', madeBy(draft));
+    return html`
+      <li class="place">
+        <button ?disabled=${mended} @click=${show}>${name}${mended ? ' ✓ mended' : ''}</button>
+        <span class="quiet small">${short(candidate.mouth)} wide · ${inward}</span>
+        ${
+          mended
+            ? nothing
+            : html`<button class="own" ?disabled=${work !== undefined} aria-label="Mend ${name}" @click=${mend}>
+                Mend
+              </button>`
+        }
+      </li>
     `;
   }
 
@@ -157,7 +175,7 @@ export class HolesPanel extends Panel {
             <li class="other">
               <span class="name">${nameOf(entry)} ✓ mended</span>
               <button
-                class="back"
+                class="own"
                 ?disabled=${work !== undefined}
                 aria-label="Put back ${at + 1}: ${nameOf(entry)}"
                 @click=${() => void this.editor.unmake(entry)}
@@ -189,7 +207,8 @@ export class HolesPanel extends Panel {
     const id = loop.id ?? 0;
     const { step, skipped, chosen } = this.editor;
     const filled = step.holes.includes(id);
-    const skip = skipped.find((it) => it.id === id && !CHOICES.has(it.code ?? ''));
+    const skip = leftOpen(skipped).find((it) => it.id === id);
+    const doubts = filled ? (this.editor.reportOf(id)?.doubts ?? []) : [];
     const name = `${styleOf(loop.kind ?? '').singular} ${id}`;
     return html`
       <li>
@@ -207,7 +226,8 @@ export class HolesPanel extends Panel {
           ${name}${filled ? ' ✓ mended' : ''}
         </button>
         <span class="quiet small">${short(loop.length)} long · ${loop.vertices} vertices</span>
-        ${sureness(loop)} ${skip ? html`<span class="why quiet small">Left open: ${skip.reason}.</span>` : nothing}
+        ${sureness(loop)} ${skip ? html`<span class="why quiet small">${reasonInWords(skip)}</span>` : nothing}
+        ${doubts.map((doubt) => html`<span class="why quiet small">Doubtful: ${doubt}.</span>`)}
       </li>
     `;
   }
@@ -251,17 +271,34 @@ function nameOf(entry: MadeHole): string {
 }
 
 /** How sure the service is about a kind, and why, where it had to decide between a hole and an opening. */
-function sureness({ confidence = 0, evidence = [] }: Loop): TemplateResult | typeof nothing {
+function sureness({
+  kind = 'LOOP_KIND_UNSPECIFIED',
+  confidence = 0,
+  evidence = [],
+}: Loop): TemplateResult | typeof nothing {
   if (evidence.length === 0) {
     return nothing;
   }
-  const strongest = [...evidence].sort((a, b) => Math.abs(b.weight ?? 0) - Math.abs(a.weight ?? 0));
+  // Above 0 for an opening, below for a hole.
+  const side = kind === 'HOLE' ? -1 : 1;
+  const strongest = [...evidence].sort((a, b) => side * ((b.weight ?? 0) - (a.weight ?? 0)));
+  const said = ({ weight = 0, reason }: (typeof evidence)[number]): string =>
+    side * weight < 0 ? `But ${reason}` : `As ${reason}`;
   return html`
     <details class="why quiet small">
-      <summary>${Math.round(confidence * 100)} % sure</summary>
-      ${strongest.map(({ reason }) => html`<p>${reason}</p>`)}
+      <summary>${Math.round(confidence * 100)} % sure that it is ${kindInWords(kind)}</summary>
+      ${strongest.map((each) => html`<p>${said(each)}</p>`)}
     </details>
   `;
+}
+
+/** What can be done with a scan without holes. */
+function noHoles(loops: readonly Loop[], candidates: readonly BorderCandidate[]): string {
+  return [
+    'This scan has no holes.',
+    ...(loops.some(isFillable) ? ['An opening or an end of a sleeve is filled when you choose it.'] : []),
+    ...(candidates.length > 0 ? ['What is bitten or torn at its border is listed below.'] : []),
+  ].join(' ');
 }
 
 customElements.define('darn-holes', HolesPanel);

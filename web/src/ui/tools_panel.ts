@@ -20,6 +20,7 @@ import {
   type PinchDraft,
   type PolygonDraft,
   type TwistDraft,
+  unmade,
   withCorner,
   withFacing,
   withHandle,
@@ -170,13 +171,13 @@ export class ToolsPanel extends Panel {
 
   /** The gesture that is being made, or one that changes nothing yet. */
   private draftOf(kind: DraftKind): Draft | undefined {
-    const { draft, editable, scan } = this.editor;
+    const { draft, editable, scan, step } = this.editor;
     const [patch] = editable;
     if (draft?.kind === kind) {
       return draft;
     }
     if (kind === 'cut' || kind === 'polygon' || kind === 'border') {
-      return scan && firstMaking(kind, scan);
+      return scan && firstMaking(kind, { ...scan, candidates: unmade(scan.candidates, step.made) });
     }
     const first = patch && firstDraft(kind, patch);
     return first?.kind === 'twist' ? { ...first, radius: this.editor.twistRadius } : first;
@@ -192,7 +193,9 @@ export class ToolsPanel extends Panel {
       <form @submit=${(event: Event) => this.apply(event, draft)}>
         ${isMaking(draft) ? this.shapes(draft) : this.holeField(draft)} ${this.fields(draft)}
         <div class="row wide">
-          <button class="main" ?disabled=${busy || !isWhole(draft)}>${commitWord(draft)}</button>
+          <button class="main" ?disabled=${busy || !isWhole(draft) || this.isUnseen(draft)}>
+            ${commitWord(draft)}
+          </button>
           <button type="button" ?disabled=${this.editor.draft === undefined} @click=${() => this.editor.dropDraft()}>
             Cancel
           </button>
@@ -200,6 +203,11 @@ export class ToolsPanel extends Panel {
         </div>
       </form>
     `;
+  }
+
+  /** Whether a draft would mend a stretch of border that is not drawn. */
+  private isUnseen(draft: Draft): boolean {
+    return draft.kind === 'border' && draft !== this.editor.draft;
   }
 
   private mapButton(draft: AnchorDraft): TemplateResult {
