@@ -170,6 +170,7 @@ inEditor('cloth that is no plausible one is left open with its reason, and accep
   const why = page.locator('darn-holes li', { hasText: `Hole ${left.id}` }).locator('.why', { hasText: 'Left open' });
   const text = await why.innerText();
   assert.match(text, /^Left open: its patch is no plausible cloth: .* as much cloth as the piece/);
+  assert.match(text, /“Mend with doubtful cloth, too” applies it all the same\.$/);
   assert.doesNotMatch(text, /acceptDoubtful|hole \d/);
   await editor.keep('doubtful-left');
   await page.getByLabel('Mend with doubtful cloth, too').check();
@@ -205,3 +206,31 @@ inEditor(
     }
   },
 );
+
+inEditor('where all that is chosen is refused as doubtful, it can be accepted, too', async (editor, page) => {
+  await drop(page, 'frame.glb', sheetAndFrame());
+  await page.getByText('Holes (2)').waitFor();
+  await editor.idle();
+  const accept = page.getByLabel('Mend with doubtful cloth, too');
+  await page.getByLabel('Choose Hole 3').uncheck();
+  assert.equal(await accept.count(), 0);
+  await editor.button('Mend 1 hole').click();
+  await editor.idle();
+  assert.match(await page.getByRole('alert').innerText(), /“Mend with doubtful cloth, too” applies it all the same\./);
+  await accept.check();
+  await editor.button('Mend 1 hole').click();
+  await editor.idle();
+  assert.equal(await page.getByRole('alert').count(), 0);
+  assert.equal(await page.getByText('Hole 2 ✓ mended').count(), 1);
+  // What is made by hand is accepted by the same control.
+  await page.evaluate(() => document.querySelector('darn-editor').editor.undo());
+  await accept.check();
+  await page.evaluate(() => {
+    const { editor: it } = document.querySelector('darn-editor');
+    return it.make('Cut out', { cut: { center: [0.2, 0, 0.2], radius: 0.12 } });
+  });
+  await editor.idle();
+  const { acceptDoubtful, holes } = await constraintsOf(editor);
+  assert.equal(acceptDoubtful, true);
+  assert.equal(holes.length, 1);
+});

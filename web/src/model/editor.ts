@@ -2,6 +2,7 @@
 import {
   type HoleReport,
   type Info,
+  ProblemError,
   type Progress,
   type Service,
   type Skipped,
@@ -37,7 +38,7 @@ import { documentOf } from './gltf_document.js';
 import { History } from './history.js';
 import { LiveDraft } from './live_draft.js';
 import { foundInWords, isHole } from './loops.js';
-import { stepInWords } from './report.js';
+import { stepInWords, withControls } from './report.js';
 import { fetchedScan } from './scan_files.js';
 import { type Patch, ScanSession } from './scan_session.js';
 import type { Texture } from './textures.js';
@@ -53,6 +54,8 @@ export class Editor extends EventTarget {
   chosen: ReadonlySet<number> = new Set();
   /** Whether the next mend applies patches that are no plausible cloth. */
   acceptDoubtful = false;
+  /** Whether the last mend was refused because its patches are no plausible cloth. */
+  isRefusedAsDoubtful = false;
   /** The loops that the service left as they were at the last mend, with why. */
   skipped: readonly Skipped[] = [];
   tool: Tool = 'look';
@@ -174,7 +177,7 @@ export class Editor extends EventTarget {
       this.history = new History<Step>(START);
       this.chosen = new Set(loops.filter(isHole).map((loop) => loop.id ?? 0));
       this.skipped = [];
-      this.acceptDoubtful = false;
+      this.acceptDoubtful = this.isRefusedAsDoubtful = false;
       this.search.forget();
       this.dropDraft();
       this.message = `${name} is open: ${foundInWords(loops, candidates.length)}.`;
@@ -216,8 +219,8 @@ export class Editor extends EventTarget {
 
   /** Mends a hole that an entry of `holes` makes, beside what is filled already. */
   async make(label: string, entry: MadeHole): Promise<void> {
-    const { step } = this;
-    await this.fill(label, { ...step, made: [...step.made, entry], selection: undefined });
+    const { step, acceptDoubtful } = this;
+    await this.fill(label, { ...step, made: [...step.made, entry], acceptDoubtful, selection: undefined });
   }
 
   /** Takes back a made hole: cloth that was cut out is there again. */
@@ -370,7 +373,8 @@ export class Editor extends EventTarget {
   /** Shows an error to the person. */
   report(error: unknown): void {
     if (!isAbort(error)) {
-      this.problem = describeError(error);
+      this.isRefusedAsDoubtful = error instanceof ProblemError && error.code === 'no_plausible_fill';
+      this.problem = withControls(describeError(error));
       this.changed();
     }
   }

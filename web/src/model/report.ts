@@ -18,10 +18,17 @@ export function leftOpen(skipped: readonly Skipped[]): Skipped[] {
   return skipped.filter(({ code = '' }) => !CHOICES.has(code));
 }
 
-/** Why a loop is left open, for who sees it and has a control to accept doubtful cloth. */
+/** Why a loop is left open. */
 export function reasonInWords({ id, reason = '' }: Skipped): string {
-  const said = reason.replace(`hole ${id}: `, '').replace(/; `acceptDoubtful` applies it all the same$/, '');
-  return `Left open: ${said}.`;
+  return `Left open: ${withControls(reason.replace(`hole ${id}: `, ''))}.`;
+}
+
+/** The control that accepts doubtful cloth. */
+export const ACCEPT_DOUBTFUL = 'Mend with doubtful cloth, too';
+
+/** A text of the service with the page's control in place of the member of a request. */
+export function withControls(text: string): string {
+  return text.replaceAll('`acceptDoubtful`', `“${ACCEPT_DOUBTFUL}”`);
 }
 
 /** One sentence or two for each hole. */

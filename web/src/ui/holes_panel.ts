@@ -3,7 +3,7 @@ import type { BorderCandidate, Loop } from '../client.js';
 import type { MadeHole } from '../model/constraints.js';
 import { bordering, isMade, madeBy } from '../model/draft.js';
 import { byKind, isFillable, isHole, kindInWords, short, styleOf } from '../model/loops.js';
-import { leftOpen, reasonInWords } from '../model/report.js';
+import { ACCEPT_DOUBTFUL, leftOpen, reasonInWords } from '../model/report.js';
 import { type TemplateResult, css, html, nothing, svg } from '../vendor.js';
 import './fill_stepper.js';
 import { Panel } from './panel.js';
@@ -105,15 +105,15 @@ export class HolesPanel extends Panel {
 
   /** The choice to apply patches that were made and not applied, once there are such. */
   private doubtful(): TemplateResult | typeof nothing {
-    const { skipped, acceptDoubtful } = this.editor;
-    if (!acceptDoubtful && !skipped.some(({ code }) => code === 'no_plausible_fill')) {
+    const { skipped, acceptDoubtful, isRefusedAsDoubtful } = this.editor;
+    if (!acceptDoubtful && !isRefusedAsDoubtful && !skipped.some(({ code }) => code === 'no_plausible_fill')) {
       return nothing;
     }
     const change = (event: Event): void => this.editor.setAcceptDoubtful((event.target as HTMLInputElement).checked);
     return html`
       <label class="doubtful">
         <input type="checkbox" .checked=${acceptDoubtful} @change=${change} />
-        Mend with doubtful cloth, too
+        ${ACCEPT_DOUBTFUL}
       </label>
     `;
   }
