@@ -56,6 +56,10 @@ fn a_bite_is_told_and_left_until_it_is_asked_for() {
         assert_eq!(told.len(), 1, "{told:?}");
         let error = mended(&bytes, &Constraints::default()).unwrap_err();
         assert_eq!(error.code().word, "no_holes");
+        assert!(
+            error.to_string().contains("\"border\": \"auto\""),
+            "{error}"
+        );
 
         let auto = mended(&bytes, &asking(Border::Auto)).unwrap();
         assert_eq!(auto.report.holes.len(), 1);

@@ -21,6 +21,8 @@ const LONGEST: f64 = 0.55;
 const LEAST_DETOUR: f64 = 1.2;
 /// Least depth of a bite, in mean edges of its loop.
 pub const LEAST_DEPTH: f64 = 3.0;
+/// How steeply a bite leaves the hem at least, as a slope: its ends are where it does.
+const SHALLOWEST: f64 = 0.1;
 /// How the hems beside a bite may run: less hem has to be straighter.
 const HEMS: [HemRule; 4] = [
     HemRule::straight(1.0, 0.45),
@@ -101,9 +103,9 @@ pub fn bites(
             found.extend(line.bite(&stretch));
         }
     }
-    // The tightest first: others that overlap it have some of the hem, too.
-    let detour = |bite: &Bite| bite.length / bite.mouth.max(f64::MIN_POSITIVE);
-    found.sort_by(|a, b| detour(b).total_cmp(&detour(a)).then(a.from.cmp(&b.from)));
+    // First the deepest with the narrowest mouth: others that overlap it start within the bite, or have some of the hem, too.
+    let rank = |bite: &Bite| bite.depth - SHALLOWEST * bite.mouth;
+    found.sort_by(|a, b| rank(b).total_cmp(&rank(a)).then(a.from.cmp(&b.from)));
     found.extend(torn_corners(&line, mesh, rim, &mut steps)?);
     let mut apart: Vec<Bite> = Vec::new();
     for bite in found {
@@ -233,7 +235,7 @@ mod tests {
             {
                 assert_eq!(bites.len(), [1, 1, 2][k], "{k} {fold}: {bites:?}");
                 for (bite, from, to) in bites {
-                    let at_edge = |p: &Vec3| p.x.min(p.y).min(1.0 - p.x) < 0.05;
+                    let at_edge = |p: &Vec3| p.x.min(p.y).min(1.0 - p.x) < 1e-6;
                     assert!(
                         at_edge(from) && at_edge(to),
                         "{k} {fold}: {bite:?} {from} {to}"
@@ -265,7 +267,7 @@ mod tests {
                 panic!("{bites:?}");
             };
             assert!(
-                bite.depth > 0.15 && from.y < 0.05 && to.y < 0.05,
+                bite.depth > 0.15 && from.y < 1e-6 && to.y < 1e-6,
                 "{bites:?}"
             );
         }

@@ -66,7 +66,11 @@ pub fn candidates(
     Ok(bites.chain(tears).collect())
 }
 
-fn all_bites<'a>(
+/// The bites and torn corners of all loops that are the cloth's own edge.
+///
+/// # Errors
+/// `Exhausted`.
+pub fn all_bites<'a>(
     welded: &'a WeldedScan,
     budget: &Budget,
 ) -> Result<Vec<(&'a BoundaryLoop, Bite)>, Exhausted> {

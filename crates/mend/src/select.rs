@@ -3,6 +3,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::bites::Bite;
+use crate::border::all_bites;
 use crate::error::MendError;
 use crate::nearest_loop::NearestLoop;
 use crate::welded_scan::{WeldedScan, kind};
@@ -110,6 +112,7 @@ impl Selection {
         }
         skipped.retain(|s| !requests.0.contains_key(&s.id));
         if requests.0.is_empty() {
+            let skipped = with_bites(skipped, &all_bites(welded, budget)?);
             return Err(MendError::NoHoles { skipped });
         }
         Ok(Selection {
@@ -264,6 +267,19 @@ impl SkipReason {
             ..v1::Skipped::default()
         }
     }
+}
+
+/// The entries of loops that are left, with what could be mended at their edges.
+fn with_bites(mut skipped: Vec<v1::Skipped>, bites: &[(&BoundaryLoop, Bite)]) -> Vec<v1::Skipped> {
+    for entry in &mut skipped {
+        let count = bites.iter().filter(|(rim, _)| rim.id.0 == entry.id).count();
+        if count > 0 {
+            entry.reason.push_str(&format!(
+                "; {count} bite(s), rip(s) or torn corner(s) in it are mended by `\"border\": \"auto\"`"
+            ));
+        }
+    }
+    skipped
 }
 
 /// Whether a loop's rim is torn where the piece's other edges are finished.

@@ -20,6 +20,8 @@ const FEWEST: usize = 2;
 const LONGEST: f64 = 0.3;
 /// How much of a hem is looked at beside a torn corner, for a tear has straight parts, too: so many times what is looked at beside a whole one.
 const HEM_BESIDE_TEAR: f64 = 2.0;
+/// The most of a hem that is looked at to prolong it, as a share of the loop.
+const MOST_HEM: f64 = 0.1;
 /// Largest ratio of length to chord of the hems.
 const STRAIGHT: f64 = 1.03;
 
@@ -146,17 +148,18 @@ fn bite(
     })
 }
 
-/// Where the hems meet in the scene: each prolonged as it runs there, and the middle of both.
+/// Where the hems meet in the scene: each prolonged as it runs there over as much of its length, so that a fold beside the tear does not count for
+/// all of it, and the middle of both.
 fn prolonged_to(
     line: &FlatLine,
     mesh: &TriMesh,
     rim: &BoundaryLoop,
     ends: [(usize, f64); 2],
 ) -> Vec3 {
-    let reach = LEAST_HEM * line.length;
     let at = |k: usize| mesh.positions[rim.vertices[k % line.vertices].index()];
-    let [from, to] = [(ends[0], -reach), (ends[1], reach)].map(|((k, by), reach)| {
-        let hem = at(k) - at(line.vertex_after(k, reach));
+    let [from, to] = [(ends[0], -1.0), (ends[1], 1.0)].map(|((k, by), way)| {
+        let reach = by.clamp(LEAST_HEM * line.length, MOST_HEM * line.length);
+        let hem = at(k) - at(line.vertex_after(k, way * reach));
         at(k) + hem.try_normalize(0.0).unwrap_or_default() * by
     });
     (from + to) * 0.5
