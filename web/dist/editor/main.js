@@ -374,7 +374,7 @@ void main() {
       <ul aria-label="Bites, rips and tears at the border">
         ${e.map((t,r)=>this.candidate(t,r))}
       </ul>
-    `}candidate(e,t){let{step:r,work:o}=this.editor,s=e.border?.facing!==void 0,i=`${s?"Tear":"Bite or rip"} ${t+1}`,a=s?`${g(e.length)} long`:`${g(e.depth)} deep`,d=$t(e,r.made),c=Se(e),l=()=>{this.editor.setTool("border"),d||this.editor.preview(c)},h=()=>{this.editor.make("Border",ie(c))};return k`
+    `}candidate(e,t){let{step:r,work:o}=this.editor,s=e.border?.facing!==void 0,i=`${s?"Tear":"Bite or rip"} ${t+1}`,a=s?`${g(e.length)} long`:`${g(e.depth)} deep`,d=$t(e,r.made),c=Se(e),l=()=>{this.editor.setTool("border"),this.editor.preview(c)},h=()=>{this.editor.make("Border",ie(c))};return k`
       <li class="place">
         <button ?disabled=${d} @click=${l}>${i}${d?" \u2713 mended":""}</button>
         <span class="quiet small">${g(e.mouth)} wide · ${a}</span>

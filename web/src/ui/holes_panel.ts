@@ -141,9 +141,7 @@ export class HolesPanel extends Panel {
     const draft = bordering(candidate);
     const show = (): void => {
       this.editor.setTool('border');
-      if (!mended) {
-        this.editor.preview(draft);
-      }
+      this.editor.preview(draft);
     };
     const mend = (): void => void this.editor.make('Border', madeBy(draft));
     return html`
