@@ -158,6 +158,28 @@ inEditor('a bite is mended where it is listed, and not offered again until it is
   assert.equal(await mend.isEnabled(), true);
 });
 
+inEditor('a torn corner is shown and mended up to where it was', async (editor, page) => {
+  await drop(
+    page,
+    'corner.glb',
+    sheetGlb(30, (i, j) => i + j < 9),
+  );
+  await page.getByRole('button', { name: 'Torn corner 1', exact: true }).click();
+  await editor.idle();
+  const { along } = await editor.model((it) => it.draft);
+  assert.equal(along.length, 1);
+  await editor.keep('torn-corner');
+  await editor.button('Mend Torn corner 1').click();
+  await page.getByText('Torn corner 1 ✓ mended').waitFor();
+  await editor.idle();
+  const places = await editor.model((it) => [...it.patches[0].positions]);
+  const off = Array.from({ length: places.length / 3 }, (_, k) =>
+    Math.hypot(...along[0].map((value, axis) => value - places[3 * k + axis])),
+  );
+  assert.ok(Math.min(...off) < 0.03, `${Math.min(...off)}`);
+  assert.deepEqual(await complaints(page), []);
+});
+
 inEditor('cloth that is no plausible one is left open with its reason, and accepted', async (editor, page) => {
   await drop(page, 'frame.glb', sheetAndFrame());
   await page.getByText('Holes (2)').waitFor();

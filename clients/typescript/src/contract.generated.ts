@@ -533,7 +533,7 @@ export interface components {
         };
         /** @description A stretch of the cloth's own edge: the way into the cloth from `from` to `to`; where the cloth is torn in two, the torn edge, with the one that faces it; or, with `auto` alone, every bite and rip that is found. */
         Border: {
-            /** @description Whether every bite and rip that is found is mended. */
+            /** @description Whether every bite, rip and torn corner that is found is mended. */
             auto?: boolean;
             /** @description Where the stretch starts, `[x, y, z]`: the nearest vertex of the cloth's own edge. */
             from?: number[];
@@ -715,9 +715,9 @@ export interface components {
             component?: number;
             /** @description Largest distance between two of its vertices, in the scene's unit. */
             diameter?: number;
-            /** @description How sure the kind is, from 0.5 to 1: the probability that a loop which cloth surrounds is a hole, or an opening; 1 for other kinds, which turning alone tells apart. */
+            /** @description How sure the kind is, from 0.5 to 1: the probability that a loop which cloth surrounds is a hole, or an opening, or that a tube's end which is torn or almost surrounded is one; 1 for other loops, which turning alone tells apart. */
             confidence?: number;
-            /** @description What the kind of a hole or an opening rests on. */
+            /** @description What the kind rests on, of a hole, an opening, or a tube's end in doubt. */
             evidence?: components["schemas"]["Evidence"][];
         };
         /** @description What FindHoles answers. */
@@ -756,9 +756,9 @@ export interface components {
             length?: number;
             /** @description Distance of its ends on the cloth laid flat, in the scene's unit; of a torn edge the mean distance to the edge that faces it. */
             mouth?: number;
-            /** @description How far it leads into the cloth laid flat, in the scene's unit; 0 for a torn edge. */
+            /** @description How far it leads into the cloth laid flat, in the scene's unit, a torn corner from where it was; 0 for a torn edge. */
             depth?: number;
-            /** @description The stretch: `{"holes": [{"border": this}]}` mends it. */
+            /** @description The stretch: `{"holes": [{"border": this}]}` mends it. `along` has the corner that was torn off. */
             border?: components["schemas"]["Border"];
             /** @description The loop of the torn edge that faces it. */
             facingLoop?: number;

@@ -21,8 +21,9 @@ const LONGEST: f64 = 0.55;
 const LEAST_DETOUR: f64 = 1.2;
 /// Least depth of a bite, in mean edges of its loop.
 pub const LEAST_DEPTH: f64 = 3.0;
-/// How steeply a bite leaves the hem at least, as a slope: its ends are where it does.
-const SHALLOWEST: f64 = 0.1;
+/// A bite ends where its line is less than this many times as long as the hem across it would be: above [`LARGEST_WAVE`](crate::flat_line), so that a
+/// wavy hem is no part of it.
+const DETOUR: f64 = 1.15;
 /// How the hems beside a bite may run: less hem has to be straighter.
 const HEMS: [HemRule; 4] = [
     HemRule::straight(1.0, 0.45),
@@ -103,8 +104,8 @@ pub fn bites(
             found.extend(line.bite(&stretch));
         }
     }
-    // First the deepest with the narrowest mouth: others that overlap it start within the bite, or have some of the hem, too.
-    let rank = |bite: &Bite| bite.depth - SHALLOWEST * bite.mouth;
+    // First the one that is longest beyond its mouth: others that overlap it start within the bite, or have some of the hem, too.
+    let rank = |bite: &Bite| bite.length - DETOUR * bite.mouth;
     found.sort_by(|a, b| rank(b).total_cmp(&rank(a)).then(a.from.cmp(&b.from)));
     found.extend(torn_corners(&line, mesh, rim, &mut steps)?);
     let mut apart: Vec<Bite> = Vec::new();
@@ -200,7 +201,7 @@ impl FlatLine {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use std::f64::consts::PI;
+    use std::f64::consts::{PI, TAU};
 
     use darn_geometry::mesh::loops::{LoopKind, boundary_loops};
     use darn_geometry::mesh::shapes::{sheet, tube};
@@ -273,8 +274,13 @@ mod tests {
         }
     }
 
-    /// Bites of the loops of a ball with a mouth at either pole, each this wide from it, radians; the mouth at the lower one may be torn.
-    fn of_bag(mouth: f64, flat: f64, keep: impl Fn(f64, f64) -> bool) -> Vec<Vec<Bite>> {
+    /// Bites of the loops of a ball with a mouth at either pole, each this wide from it, radians; the mouth at the lower one may be torn. Beside each
+    /// bite, how far its ends lie above the lower mouth and from each other.
+    fn of_bag(
+        mouth: f64,
+        flat: f64,
+        keep: impl Fn(f64, f64) -> bool,
+    ) -> Vec<Vec<(Bite, [f64; 3])>> {
         let mut soup = tube(72, keep);
         for p in &mut soup.positions {
             let polar = mouth + (PI - 2.0 * mouth) * p.z / 4.0;
@@ -284,7 +290,18 @@ mod tests {
         let topology = Topology::new(&mesh);
         let mut loops = boundary_loops(&mesh, &topology);
         loops.sort_by(|a, b| a.centroid.z.total_cmp(&b.centroid.z));
-        let bites = |l: &BoundaryLoop| bites(&mesh, &topology, l, Budget::unlimited()).unwrap();
+        let bites = |l: &BoundaryLoop| {
+            let at = |k: usize| mesh.positions[l.vertices[k].index()];
+            let above = |k: usize| at(k).z + mouth.cos();
+            let found = bites(&mesh, &topology, l, Budget::unlimited()).unwrap();
+            let ends = |b: Bite| {
+                (
+                    b,
+                    [above(b.from), above(b.to), (at(b.to) - at(b.from)).norm()],
+                )
+            };
+            found.into_iter().map(ends).collect()
+        };
         loops.iter().map(bites).collect()
     }
 
@@ -293,11 +310,14 @@ mod tests {
 
         #[test]
         fn a_rip_of_a_round_opening_is_found_and_its_own_arcs_are_none(
-            mouth in 0.4..1.2f64, flat in 0.7..1.0f64, depth in 0.2..0.35f64, width in 1.0..3.5f64, at in 0.0..1.0f64,
+            mouth in 0.55..1.1f64, flat in 0.75..1.0f64, depth in 0.3..0.4f64, width in 1.0..3.5f64, at in 0.0..1.0f64,
         ) {
             let away = move |u: f64| 72.0 * (u - at).abs().min(1.0 - (u - at).abs());
             let ripped = of_bag(mouth, flat, |u, v| away(u) > width || v > depth * (1.0 - away(u) / width / 2.0));
             prop_assert_eq!(ripped.iter().map(Vec::len).collect::<Vec<_>>(), [1, 0], "{:?}", ripped);
+            let (bite, [from, to, wide]) = ripped[0][0];
+            let edge = TAU * mouth.sin() / 72.0;
+            prop_assert!(from.max(to) < 1e-6 && wide < (2.0 * width + 4.0) * edge, "{:?} {} {} {}", bite, from, to, wide);
             let whole = of_bag(mouth, flat, |_, _| true);
             prop_assert_eq!(whole.iter().map(Vec::len).collect::<Vec<_>>(), [0, 0], "{:?}", whole);
         }

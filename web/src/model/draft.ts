@@ -132,14 +132,14 @@ export interface MakingStart {
   readonly candidates: readonly BorderCandidate[];
 }
 
-/** A bite, a rip or a tear that was found. */
+/** A bite, a rip, a torn corner or a tear that was found. */
 export function bordering({ border }: BorderCandidate): BorderDraft {
   const ends = ({ from, to }: { from?: number[]; to?: number[] }): EdgeEnds => ({
     from: pointOf(from),
     to: pointOf(to),
   });
-  const facing = border?.facing;
-  return { kind: 'border', ...ends(border ?? {}), along: [], ...(facing && { facing: ends(facing) }) };
+  const { facing, along = [] } = border ?? {};
+  return { kind: 'border', ...ends(border ?? {}), along: along.map(pointOf), ...(facing && { facing: ends(facing) }) };
 }
 
 /** The bites, rips and tears of a scan that are not among what is made. */

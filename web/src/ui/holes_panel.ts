@@ -118,7 +118,7 @@ export class HolesPanel extends Panel {
     `;
   }
 
-  /** Bites, rips and tears at the cloth's own edge; choosing one shows it in the border tool. */
+  /** Bites, rips, torn corners and tears at the cloth's own edge; choosing one shows it in the border tool. */
   private candidates(): TemplateResult | typeof nothing {
     const candidates = this.editor.scan?.candidates ?? [];
     if (candidates.length === 0) {
@@ -135,7 +135,7 @@ export class HolesPanel extends Panel {
   private candidate(candidate: BorderCandidate, at: number): TemplateResult {
     const { step, work } = this.editor;
     const isTear = candidate.border?.facing !== undefined;
-    const name = `${isTear ? 'Tear' : 'Bite or rip'} ${at + 1}`;
+    const name = `${damage(candidate)} ${at + 1}`;
     const inward = isTear ? `${short(candidate.length)} long` : `${short(candidate.depth)} deep`;
     const mended = isMade(candidate, step.made);
     const draft = bordering(candidate);
@@ -257,7 +257,7 @@ export class HolesPanel extends Panel {
 function nameOf(entry: MadeHole): string {
   if ('border' in entry) {
     const part = entry.border.facing ? 'Tear' : 'Part of the border';
-    return entry.border.auto ? 'All bites and rips' : part;
+    return entry.border.auto ? 'All bites, rips and torn corners' : part;
   }
   const { radius, loops, polygon } = entry.cut;
   if (radius !== undefined) {
@@ -291,6 +291,14 @@ function sureness({
 }
 
 /** What can be done with a scan without holes. */
+/** What a place at the border suffered, for a person. */
+function damage({ border }: BorderCandidate): string {
+  if (border?.facing !== undefined) {
+    return 'Tear';
+  }
+  return (border?.along ?? []).length > 0 ? 'Torn corner' : 'Bite or rip';
+}
+
 function noHoles(loops: readonly Loop[], candidates: readonly BorderCandidate[]): string {
   return [
     'This scan has no holes.',
