@@ -1,6 +1,7 @@
 """The network of a weights file in PyTorch, as src/net/unet.rs has it, batch norm with the statistics it has: for training and for measuring."""
 
 import json
+import os
 import struct
 
 import torch
@@ -26,7 +27,7 @@ def read(path):
 
 
 def write(path, card, tensors):
-    """Kernels as f16, vectors as f32; the order of src/net/weights.rs."""
+    """Kernels as f16, vectors as f32; the order of src/net/weights.rs. A reader sees the old file or the new one, never a part."""
     header, body, at = {"__metadata__": {"darn": json.dumps(card, separators=(",", ":"))}}, [], 0
     for kind in ("F32", "F16"):
         for name in sorted(tensors):
@@ -39,8 +40,9 @@ def write(path, card, tensors):
             at += len(data)
     text = json.dumps(header, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 8)
-    with open(path, "wb") as file:
+    with open(f"{path}.partial", "wb") as file:
         file.write(struct.pack("<Q", len(text)) + text + b"".join(body))
+    os.replace(f"{path}.partial", path)
 
 
 def told_up(tensors):

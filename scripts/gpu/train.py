@@ -1,39 +1,41 @@
 """Trains networks of `darn` side by side on an NVIDIA GPU, all on the same samples, which `darn samples` makes on the CPU's cores.
 
-Each `--student NAME:FROM:OUT` starts from a weights file: NAME is `standard`, `gravity` (told where up is) or `interpen` (cloth repels cloth).
-AdamW, one clip of the whole gradient, averaged weights, warm-up and half a cosine, as src/train does it by the engine: batch norm keeps its
-statistics.
+Each `--student` is a list `from=WEIGHTS,out=NAME` with, where wanted, `kind=standard|gravity|interpen` (gravity is told where up is, interpen's
+cloth repels cloth), `optimiser=adamw|muon`, `width=N` (grown from the weights without changing an answer, then disturbed a little), `rate=R`,
+`target=truth|mean` (the truth, or the mean of the answers of `teacher=WEIGHTS`, else of `from`, to the eight symmetries of the grid). One clip of
+the whole gradient, averaged weights, warm-up and half a cosine over the minutes, as crates/lab/src/train does it by the engine: batch norm keeps
+its statistics. Scores and weights are written at intervals and at the end; writing them is part of the minutes.
 """
 
 import argparse
-import json
 import math
-import queue
-import subprocess
-import threading
+import os
 import time
 
-import numpy
 import torch
 
-from loss import RECORD, Samples, loss, scores
-from network import predict, read, told_up, write
+from loss import RECORD
+from pool import Mixture, held_out
+from student import Student
 
-BETA1, BETA2, EPSILON, DECAY, CLIP, AVERAGE = 0.9, 0.99, 1e-8, 1e-2, 1.0, 0.998
 WARM_UP, LAST_RATE = 200, 0.01
+# The last export starts this much earlier than the slowest step and the slowest export so far would need.
+SPARE_SECONDS = 2.0
 
 
 def arguments():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--darn", default="darn")
-    parser.add_argument("--sheets", required=True)
-    parser.add_argument("--held-out", required=True)
-    parser.add_argument("--student", action="append", required=True, metavar="NAME:FROM:OUT")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--samples", default="darn samples", help="the command that makes samples")
+    parser.add_argument("--set", action="append", required=True, metavar="FOLDER:SHARE", help="sheets to learn from, and their share of every batch")
+    parser.add_argument("--held-out", action="append", required=True, metavar="NAME:FOLDER", help="sheets to be measured on; the first for the card")
+    parser.add_argument("--student", action="append", required=True, metavar="from=WEIGHTS,out=NAME,...")
+    parser.add_argument("--out", required=True, help="folder for weights and scores")
     parser.add_argument("--minutes", type=float, required=True)
-    parser.add_argument("--every", type=float, default=3, help="minutes between scores and weights files")
+    parser.add_argument("--every", type=float, default=2, help="minutes between scores and weights files")
     parser.add_argument("--batch", type=int, default=256)
-    parser.add_argument("--rate", type=float, default=1e-3)
+    parser.add_argument("--rate", type=float, default=1e-3, help="of students that name none")
     parser.add_argument("--workers", type=int, default=14)
+    parser.add_argument("--pool", type=int, default=32768, help="samples kept on the device and drawn again, 0.1 MB each")
     parser.add_argument("--alike", type=int, default=8)
     parser.add_argument("--roughest-of", type=int, default=3)
     parser.add_argument("--seed", type=int, default=1)
@@ -43,189 +45,74 @@ def arguments():
     return parser.parse_args()
 
 
-class Stream:
-    """Batches of records from one `darn samples`."""
-
-    def __init__(self, options, seed):
-        command = [options.darn, "samples", "--upright", "--sheets", options.sheets, "--seed", str(seed)]
-        command += ["--alike", str(options.alike), "--roughest-of", str(options.roughest_of)]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, bufsize=0)
-        pinned = options.device == "cuda"
-        self.free, self.full = queue.Queue(), queue.Queue()
-        for _ in range(3):
-            self.free.put(torch.empty(options.batch, RECORD, dtype=torch.uint8, pin_memory=pinned))
-        threading.Thread(target=self.read, daemon=True).start()
-
-    def read(self):
-        while True:
-            records = self.free.get()
-            view, at = memoryview(records.numpy()).cast("B"), 0
-            while at < len(view):
-                got = self.process.stdout.readinto(view[at:])
-                if not got:
-                    return self.full.put(None)
-                at += got
-            self.full.put(records)
-
-
-class Student:
-    def __init__(self, text, options, records):
-        self.name, self.start, self.out = text.split(":")
-        self.options, self.records = options, records
-        self.card, tensors = read(self.start)
-        self.hanging = self.name == "gravity"
-        if self.hanging:
-            tensors = told_up(tensors)
-        self.weights = {"gradient": 2.0, "stretch": 5.0, "self_penetration": 0.0, "reach": options.reach}
-        if self.name == "interpen":
-            self.weights["self_penetration"] = options.beta
-        device = options.device
-        trained = {name: x for name, x in tensors.items() if not name.endswith((".mean", ".variance"))}
-        flat = lambda of: torch.cat([of(x).flatten() for x in trained.values()]).to(device)
-        self.values, self.slopes = flat(lambda x: x), flat(torch.zeros_like)
-        self.first, self.second = flat(torch.zeros_like), flat(torch.zeros_like)
-        self.averaged, self.kernels = self.values.clone(), flat(lambda x: torch.full_like(x, float(x.dim() > 1)))
-        self.fixed = {name: x.to(device) for name, x in tensors.items() if name not in trained}
-        self.shapes = {name: x.shape for name, x in trained.items()}
-        self.tensors = self.views(self.values)
-        for tensor, slope in zip(self.tensors.values(), self.views(self.slopes).values()):
-            tensor.requires_grad_()
-            tensor.grad = slope
-        self.rate, self.time = torch.zeros((), device=device), torch.zeros((), device=device, dtype=torch.float64)
-        self.said = torch.zeros(6, device=device)
-        self.measured = held_out(options, upright=self.hanging)
-        self.graph = None
-
-    def views(self, flat):
-        views, at = {}, 0
-        for name, shape in self.shapes.items():
-            views[name] = flat[at : at + shape.numel()].view(shape)
-            at += shape.numel()
-        return views
-
-    def answer(self, tensors, samples):
-        return predict(tensors, samples.filled, samples.known, samples.up if self.hanging else None)
-
-    def learn(self):
-        self.slopes.zero_()
-        samples = Samples(self.records)
-        total, terms = loss(self.answer(self.tensors | self.fixed, samples), samples, self.weights)
-        total.backward()
-        with torch.no_grad():
-            norm = self.slopes.norm()
-            # A step that is not finite is not taken.
-            slopes = torch.where(norm.isfinite(), self.slopes * (CLIP / norm).clamp(max=1), 0)
-            self.time += 1
-            self.first.lerp_(slopes, 1 - BETA1)
-            self.second.lerp_(slopes * slopes, 1 - BETA2)
-            unbias = [(1 / (1 - beta**self.time)).float() for beta in (BETA1, BETA2)]
-            change = self.first * (unbias[0] * self.rate) / (torch.sqrt(self.second * unbias[1]) + EPSILON)
-            self.values.mul_(1 - self.rate * DECAY * self.kernels).sub_(change)
-            keep = torch.clamp((1 + self.time) / (10 + self.time), max=AVERAGE).float()
-            self.averaged.mul_(keep).add_(self.values * (1 - keep))
-            self.said.lerp_(torch.cat([terms, norm[None]]), 0.02)
-
-    def capture(self):
-        """One step as a CUDA graph: a thousand small kernels for the price of one launch."""
-        state = [self.values, self.first, self.second, self.averaged, self.time, self.said]
-        kept = [x.clone() for x in state]
-        stream = torch.cuda.Stream()
-        stream.wait_stream(torch.cuda.current_stream())
-        with torch.cuda.stream(stream):
-            for _ in range(3):
-                self.learn()
-        torch.cuda.current_stream().wait_stream(stream)
-        self.graph = torch.cuda.CUDAGraph()
-        with torch.cuda.graph(self.graph):
-            self.learn()
-        with torch.no_grad():
-            for x, before in zip(state, kept):
-                x.copy_(before)
-
-    def step(self, rate):
-        self.rate.fill_(rate)
-        if self.graph:
-            self.graph.replay()
-        else:
-            self.learn()
-
-    def export(self, minutes):
-        """Scores the averaged weights and writes them; returns the scores."""
-        tensors = self.views(self.averaged) | self.fixed
-        with torch.no_grad():
-            found = scores(self.answer(tensors, self.measured), self.measured)
-            filled = scores(self.measured.filled, self.measured)
-        steps = int(self.time.item())
-        words = f"Softened data + 2 gradient + 5 stretch + {self.weights['self_penetration']:g} self-penetration"
-        if self.weights["self_penetration"] > 0:
-            words += f" within {self.options.reach:g} cells"
-        card = self.card | {"name": self.name, "scores": found | {f"fill_{name}": x for name, x in filled.items()}}
-        card["architecture"] = self.card["architecture"] | {"frame": "hanging" if self.hanging else "canonical"}
-        card["training"] = {
-            "steps": steps,
-            "batch": self.options.batch,
-            "seed": self.options.seed,
-            "samples": steps * self.options.batch,
-            "minutes": minutes,
-            "data_seed": json.load(open(f"{self.options.sheets}/manifest.json"))["seed"],
-            "loss": words,
-        }
-        tensors = {name: x.detach().float().cpu() for name, x in tensors.items()}
-        write(f"{self.out}/{self.name}.safetensors", card, tensors)
-        return found
-
-
-def held_out(options, upright):
-    """The samples that `darn train` measures such a network on."""
-    command = [options.darn, "samples", "--sheets", options.held_out, "--held-out"] + ["--upright"] * upright
-    data = numpy.frombuffer(subprocess.run(command, check=True, capture_output=True).stdout, numpy.uint8)
-    return Samples(torch.from_numpy(data.copy()).reshape(-1, RECORD).to(options.device))
+def rate_share(step, share):
+    """Share of the highest learning rate at a step, `share` of the time having passed."""
+    rise = min((step + 1) / WARM_UP, 1)
+    return rise * (LAST_RATE + (1 - LAST_RATE) * 0.5 * (1 + math.cos(math.pi * min(share, 1))))
 
 
 def main():
+    started = time.monotonic()
+    minutes = lambda: (time.monotonic() - started) / 60
     options = arguments()
+    os.makedirs(options.out, exist_ok=True)
     torch.backends.cudnn.benchmark = True
     torch.backends.cudnn.allow_tf32 = torch.backends.cuda.matmul.allow_tf32 = True
-    streams = [Stream(options, 1000 * options.seed + worker) for worker in range(options.workers)]
     records = torch.empty(options.batch, RECORD, dtype=torch.uint8, device=options.device)
-    students = [Student(text, options, records) for text in options.student]
-    records.copy_(first := streams[0].full.get())
-    streams[0].full.put(first)
-    if options.device == "cuda":
-        for student in students:
-            student.capture()
-    told = lambda found: " ".join(f"{name} {value:.4f}" for name, value in found.items())
-    for student in students:
-        print(f"{student.name} at first: {told(student.export(0))}", flush=True)
-    started, step, waited, next_export, next_line = time.monotonic(), 0, 0.0, options.every, 0.0
-    while True:
-        stream = streams[step % len(streams)]
-        before = time.monotonic()
-        batch = stream.full.get()
-        waited += time.monotonic() - before
-        records.copy_(batch, non_blocking=True)
-        minutes = (time.monotonic() - started) / 60
-        share = min(minutes / options.minutes, 1)
-        rise = min((step + 1) / WARM_UP, 1)
-        rate = options.rate * rise * (LAST_RATE + (1 - LAST_RATE) * 0.5 * (1 + math.cos(math.pi * share)))
-        for student in students:
-            student.step(rate)
+    flags = torch.zeros(options.batch, 4, dtype=torch.bool, device=options.device)
+    students = [Student(text, options, records, flags) for text in options.student]
+    mixture = Mixture(options, options.set)
+    try:
+        measured = {}
+        for text in options.held_out:
+            name, _, folder = text.partition(":")
+            measured[name] = held_out(options, folder)
+        mixture.fill(records, flags)
         if options.device == "cuda":
-            torch.cuda.synchronize()
-        stream.free.put(batch)
-        step += 1
-        if minutes >= next_line:
-            next_line += options.minutes / 60
-            said = "; ".join(f"{s.name} {' '.join(f'{x:.4f}' for x in s.said.tolist())}" for s in students)
-            print(f"{minutes:.2f} min, step {step}, waited {waited:.0f} s, rate {rate:.2e}: {said}", flush=True)
-        if minutes >= next_export or share >= 1:
-            next_export = minutes + options.every
             for student in students:
-                print(f"{minutes:.2f} min, step {step}: {student.name}: {told(student.export(minutes))}", flush=True)
+                student.capture()
+        train(options, students, mixture, measured, minutes)
+    finally:
+        mixture.stop()
+
+
+def train(options, students, mixture, measured, minutes):
+    """Steps of all students until the minutes are over, exports included."""
+
+    def export():
+        before = minutes()
+        for student in students:
+            print(f"{minutes():.2f} min, step {step}: {student.export(minutes(), measured, mixture.words())}", flush=True)
+        return minutes() - before
+
+    step, slowest = 0, 0.0
+    longest = export()
+    begun = minutes()
+    print(f"{begun:.2f} min until the first step", flush=True)
+    next_export, next_line = begun + options.every, 0.0
+    while True:
+        before = minutes()
+        last = options.minutes - longest - slowest - SPARE_SECONDS / 60
+        share = (before - begun) / max(last - begun, 1e-9)
         if share >= 1:
             break
-    for stream in streams:
-        stream.process.kill()
+        mixture.fill(students[0].records, students[0].flags)
+        for student in students:
+            student.step(rate_share(step, share))
+        if options.device == "cuda":
+            torch.cuda.synchronize()
+        step += 1
+        slowest = max(slowest, minutes() - before)
+        if minutes() >= next_line:
+            next_line = minutes() + options.minutes / 60
+            said = "; ".join(f"{s.out} {' '.join(f'{x:.4f}' for x in s.said.tolist())}" for s in students)
+            reuse = step * options.batch / mixture.made()
+            print(f"{minutes():.2f} min, step {step}, each sample {reuse:.1f} times, rate share {rate_share(step, share):.3f}: {said}", flush=True)
+        if minutes() >= next_export:
+            longest = max(longest, export())
+            next_export = minutes() + options.every
+    export()
+    print(f"{minutes():.2f} of {options.minutes:g} min used, {step} steps of {options.batch}, {mixture.made()} samples made", flush=True)
 
 
 if __name__ == "__main__":
