@@ -2,16 +2,9 @@
 
 use super::failure::{Failure, OrFail};
 use darn_lab::scarffolds::samples::SampleRotation;
-use darn_lab::train::batch::{BatchGenerator, PreparedSample, prepare};
-use darn_lab::train::{self, sample_records};
-use darn_net::{FrameKind, UnetConfig};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use std::io::{ErrorKind, IsTerminal, Write};
+use darn_lab::train::{SampleStream, StreamedSamples};
+use std::io::IsTerminal;
 use std::path::PathBuf;
-
-/// Samples written at once.
-const TOGETHER: usize = 64;
 
 #[derive(Debug, clap::Args)]
 pub struct SamplesArgs {
@@ -45,48 +38,21 @@ pub fn run(args: &SamplesArgs) -> Result<(), Failure> {
             "records are bytes: send standard output to a file or a program".into(),
         ));
     }
-    let rotation = match args.upright {
-        true => SampleRotation::Upright,
-        false => SampleRotation::Any,
-    };
-    let sampler = train::sampler(&args.sheets, rotation).or_fail("read the sheets")?;
-    let network = UnetConfig {
-        frame: match args.upright {
-            true => FrameKind::Hanging,
-            false => FrameKind::Canonical,
+    let stream = SampleStream {
+        sheets: args.sheets.clone(),
+        rotation: match args.upright {
+            true => SampleRotation::Upright,
+            false => SampleRotation::Any,
         },
-        ..UnetConfig::default()
+        samples: match args.held_out {
+            true => StreamedSamples::HeldOut,
+            false => StreamedSamples::Random {
+                count: args.count.unwrap_or(usize::MAX),
+                seed: args.seed,
+                roughest_of: args.roughest_of,
+                alike: args.alike,
+            },
+        },
     };
-    let mut records = Vec::new();
-    // Returns whether the reader still reads.
-    let mut send = |samples: &[PreparedSample]| {
-        records.clear();
-        sample_records::write(samples, &mut records);
-        match out.write_all(&records) {
-            Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
-            written => written.or_fail("write samples").map(|()| true),
-        }
-    };
-    if args.held_out {
-        let samples = train::held_out(&sampler);
-        let samples = samples.iter().filter_map(|s| prepare(s, &network));
-        return send(&samples.collect::<Vec<_>>()).map(|_| ());
-    }
-    let generator = BatchGenerator {
-        source: train::source(sampler.roughest_of(args.roughest_of), args.alike),
-        network,
-        size: TOGETHER,
-        seed: args.seed,
-    };
-    let mut rng = ChaCha8Rng::seed_from_u64(args.seed);
-    let mut left = args.count.unwrap_or(usize::MAX);
-    while left > 0 {
-        let mut samples = generator.samples(&mut rng);
-        samples.truncate(left);
-        left -= samples.len();
-        if !send(&samples)? {
-            break;
-        }
-    }
-    Ok(())
+    stream.write(&mut out).or_fail("make samples")
 }

@@ -2,7 +2,8 @@
 
 use super::failure::{Failure, OrFail};
 use darn_lab::train::{
-    LossTerms, LossWeights, RunStart, Score, TrainOptions, TrainProgress, TrainerKind,
+    LossTerms, LossWeights, OptimiserKind, RunStart, Score, TrainOptions, TrainProgress,
+    TrainerKind,
 };
 use darn_net::{FrameKind, InputKind, UnetConfig};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -76,6 +77,12 @@ pub struct TrainArgs {
     /// What computes the steps: burn, or the engine, which is several times as fast but needs weights to start from
     #[arg(long, value_enum, default_value = "burn")]
     trainer: Steps,
+    /// What turns gradients into steps; muon needs the engine
+    #[arg(long, value_enum, default_value = "adamw")]
+    optimiser: Optimiser,
+    /// Learn the mean of the answers of these weights to a grid's eight symmetries instead of the truth; needs the engine
+    #[arg(long, value_name = "WEIGHTS")]
+    teacher: Option<PathBuf>,
     /// Seed of weights and samples
     #[arg(long, default_value_t = TrainOptions::default().seed)]
     seed: u64,
@@ -152,6 +159,24 @@ impl Steps {
     }
 }
 
+/// What can turn gradients into steps.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Optimiser {
+    /// AdamW on all tensors
+    Adamw,
+    /// Muon on kernels between the first and the last layer, AdamW on the rest
+    Muon,
+}
+
+impl Optimiser {
+    fn kind(self) -> OptimiserKind {
+        match self {
+            Self::Adamw => OptimiserKind::Adamw,
+            Self::Muon => OptimiserKind::Muon,
+        }
+    }
+}
+
 /// The losses there are weights for.
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
 enum Loss {
@@ -213,6 +238,8 @@ impl TrainArgs {
             },
             from: self.from.clone(),
             trainer: self.trainer.kind(),
+            optimiser: self.optimiser.kind(),
+            teacher: self.teacher.clone(),
             network: UnetConfig {
                 width: self.width,
                 input: self.input.kind(),

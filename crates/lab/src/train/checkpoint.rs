@@ -83,7 +83,7 @@ pub fn save(
 /// Reads the state in `dir`, and the training time of all sessions together in seconds.
 ///
 /// # Errors
-/// No checkpoint, a damaged one, or one of another architecture, batch size, seed or trainer.
+/// No checkpoint, a damaged one, or one of another architecture, batch size, seed, trainer or optimiser.
 pub fn load(options: &TrainOptions, dir: &Path) -> Result<(TrainSnapshot, f64), TrainError> {
     let path = dir.join(FILE);
     let bytes = std::fs::read(&path).map_err(|source| TrainError::File {
@@ -103,10 +103,10 @@ pub fn load(options: &TrainOptions, dir: &Path) -> Result<(TrainSnapshot, f64), 
         .ok_or_else(|| refuse("not a checkpoint".into()))?;
     let header: CheckpointHeader =
         serde_json::from_str(header).map_err(|e| refuse(e.to_string()))?;
-    let same = |o: &TrainOptions| (o.network, o.batch, o.seed, o.trainer);
+    let same = |o: &TrainOptions| (o.network, o.batch, o.seed, (o.trainer, o.optimiser));
     if same(&header.options) != same(options) {
         return Err(refuse(
-            "it belongs to another architecture, batch size, seed or trainer".into(),
+            "it belongs to another architecture, batch size, seed, trainer or optimiser".into(),
         ));
     }
     let mut groups: BTreeMap<String, NamedTensors> = BTreeMap::new();

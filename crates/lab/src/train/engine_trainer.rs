@@ -8,9 +8,11 @@ use rayon::prelude::*;
 use super::batch::{PreparedSample, TrainingBatch};
 use super::error::TrainError;
 use super::loss_gradient::loss_and_gradient;
+use super::muon;
 use super::optimiser::{BETA1, BETA2, CLIP, DECAY, EPSILON, share_kept};
-use super::options::TrainOptions;
+use super::options::{OptimiserKind, TrainOptions};
 use super::snapshot::TrainSnapshot;
+use super::teacher::Teacher;
 use super::trainer::{StepOutcome, Trainer};
 use darn_geometry::grid::CELLS;
 use darn_net::engine::{
@@ -25,7 +27,9 @@ pub(super) struct EngineTrainer {
     config: UnetConfig,
     network: NamedTensors,
     averaged: NamedTensors,
-    /// First and second moments by trained tensor, in the order of the names.
+    optimiser: OptimiserKind,
+    teacher: Option<Teacher>,
+    /// First and second moments by trained tensor, in the order of the names; tensors that Muon trains have no second.
     moments: Vec<[Vec<f32>; 2]>,
     step: u64,
     buffers: WeightGradientBuffers,
@@ -38,6 +42,17 @@ struct TrainedTensor<'a> {
     moments: &'a mut [Vec<f32>; 2],
     /// Factor that the values shrink by.
     decay: f32,
+    rule: StepRule,
+}
+
+/// How a tensor of a step moves.
+#[derive(Debug, Clone, Copy)]
+enum StepRule {
+    AdamW,
+    /// Muon on a matrix of so many rows.
+    Muon {
+        outputs: usize,
+    },
 }
 
 impl EngineTrainer {
@@ -58,7 +73,7 @@ impl EngineTrainer {
         }
     }
 
-    /// One AdamW step on all tensors that have a gradient; returns the norm of the gradient before clipping.
+    /// One step on all tensors that have a gradient; returns the norm of the gradient before clipping.
     fn descend(&mut self, gradient: &NamedTensors, rate: f64) -> f64 {
         self.step += 1;
         let squares = gradient.par_iter().map(|(_, (_, values))| {
@@ -69,8 +84,14 @@ impl EngineTrainer {
         let norm = squares.collect::<Vec<_>>().iter().sum::<f64>().sqrt();
         let clip = if norm > CLIP { CLIP / norm } else { 1.0 } as f32;
         if self.moments.is_empty() {
-            let zeros = |(_, values): &(Vec<usize>, Vec<f32>)| vec![0.0; values.len()];
-            self.moments = gradient.values().map(|t| [zeros(t), zeros(t)]).collect();
+            let zeros = |(name, (shape, values)): (&String, &(Vec<usize>, Vec<f32>))| {
+                let second = match rule(self.optimiser, name, shape) {
+                    StepRule::AdamW => values.len(),
+                    StepRule::Muon { .. } => 0,
+                };
+                [vec![0.0; values.len()], vec![0.0; second]]
+            };
+            self.moments = gradient.iter().map(zeros).collect();
         }
         let time = self.step as i32;
         let unbias = |beta: f64| (1.0 / (1.0 - beta.powi(time))) as f32;
@@ -80,7 +101,8 @@ impl EngineTrainer {
         let trained = trained.filter(|(name, _)| gradient.contains_key(*name));
         let pairs = trained.zip(gradient.values()).zip(&mut self.moments);
         let tensors: Vec<TrainedTensor> = pairs
-            .map(|(((_, tensor), by), moments)| TrainedTensor {
+            .map(|(((name, tensor), by), moments)| TrainedTensor {
+                rule: rule(self.optimiser, name, &tensor.0),
                 // Kernels decay, vectors do not.
                 decay: if tensor.0.len() > 1 {
                     1.0 - rate * DECAY
@@ -94,6 +116,12 @@ impl EngineTrainer {
             .collect();
         tensors.into_par_iter().for_each(|tensor| {
             let [first, second] = tensor.moments;
+            if let StepRule::Muon { outputs } = tensor.rule {
+                let gradient: Vec<f32> = tensor.gradient.iter().map(|by| by * clip).collect();
+                tensor.values.iter_mut().for_each(|x| *x *= tensor.decay);
+                muon::step(tensor.values, &gradient, first, outputs, rate as f32);
+                return;
+            }
             let moments = first.iter_mut().zip(second);
             let values = tensor.values.iter_mut().zip(tensor.gradient);
             for ((x, by), (first, second)) in values.zip(moments) {
@@ -121,6 +149,14 @@ impl EngineTrainer {
     }
 }
 
+/// How an optimiser moves a tensor.
+fn rule(optimiser: OptimiserKind, name: &str, shape: &[usize]) -> StepRule {
+    match optimiser {
+        OptimiserKind::Muon if muon::trains(name, shape) => StepRule::Muon { outputs: shape[0] },
+        _ => StepRule::AdamW,
+    }
+}
+
 impl Trainer for EngineTrainer {
     fn of(snapshot: TrainSnapshot, options: &TrainOptions) -> Result<Self, TrainError> {
         if snapshot.step == 0 && options.from.is_none() {
@@ -129,8 +165,11 @@ impl Trainer for EngineTrainer {
                     .into(),
             ));
         }
+        let open = |path| Teacher::open(path, &options.network);
         Ok(EngineTrainer {
             config: options.network,
+            optimiser: options.optimiser,
+            teacher: options.teacher.as_deref().map(open).transpose()?,
             network: snapshot.network,
             averaged: snapshot.averaged,
             moments: snapshot.moments,
@@ -141,10 +180,13 @@ impl Trainer for EngineTrainer {
 
     fn step(
         &mut self,
-        batch: TrainingBatch,
+        mut batch: TrainingBatch,
         options: &TrainOptions,
         rate: f64,
     ) -> Result<StepOutcome, TrainError> {
+        if let Some(teacher) = &mut self.teacher {
+            teacher.teach(&mut batch)?;
+        }
         let engine = self.engine(&self.network)?;
         let input = self.input(&batch);
         let count = batch.count;

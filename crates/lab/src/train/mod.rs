@@ -7,20 +7,23 @@
 //! derivatives written out, for the engine's trainer; a test compares it with `loss`. `scripts/gpu/loss.py` has it in PyTorch, which trained the
 //! weights that ship; `scripts/gpu/check.py` compares it with this program.
 
-pub mod batch;
+mod batch;
 mod burn_trainer;
 mod checkpoint;
 mod engine_trainer;
 mod error;
 mod loss;
 mod loss_gradient;
+mod muon;
 mod near_pairs;
 mod optimiser;
 mod options;
 mod progress;
-pub mod sample_records;
+mod sample_records;
+mod sample_stream;
 mod score;
 mod snapshot;
+mod teacher;
 mod trainer;
 mod training_curves;
 mod training_data;
@@ -40,13 +43,13 @@ use engine_trainer::EngineTrainer;
 
 pub use error::TrainError;
 pub use loss::{LossKind, LossTerms, LossWeights};
-pub use options::{RunStart, TrainOptions, TrainerKind};
+pub use options::{OptimiserKind, RunStart, TrainOptions, TrainerKind};
 pub use progress::TrainProgress;
+pub use sample_stream::{SampleStream, StreamedSamples};
 pub use score::{HeldOutScores, Score};
-pub use training_data::{held_out, sampler, source};
 pub use training_loop::TrainSummary;
 
-use training_data::TrainingData;
+use training_data::{TrainingData, held_out, sampler, source};
 
 /// Trains with the trainer and the sheets of `options`; `progress` is called after every step.
 ///

@@ -21,6 +21,17 @@ pub enum TrainerKind {
     Engine,
 }
 
+/// What turns gradients into steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OptimiserKind {
+    /// AdamW on all tensors.
+    #[default]
+    Adamw,
+    /// Muon on kernels between the first and the last layer, AdamW on the rest; by the engine's trainer.
+    Muon,
+}
+
 /// The options of a run.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct TrainOptions {
@@ -40,6 +51,12 @@ pub struct TrainOptions {
     /// What computes the steps.
     #[serde(default)]
     pub trainer: TrainerKind,
+    /// What turns gradients into steps.
+    #[serde(default)]
+    pub optimiser: OptimiserKind,
+    /// Weights whose mean answer to a grid's eight symmetries is learned instead of the truth; by the engine's trainer.
+    #[serde(default)]
+    pub teacher: Option<PathBuf>,
     /// The network.
     pub network: UnetConfig,
     /// Whether sheets stay upright; otherwise they are rotated at random.
@@ -93,6 +110,8 @@ impl Default for TrainOptions {
             resume: RunStart::Fresh,
             from: None,
             trainer: TrainerKind::Burn,
+            optimiser: OptimiserKind::Adamw,
+            teacher: None,
             network: UnetConfig::default(),
             upright: false,
             open_gates: false,

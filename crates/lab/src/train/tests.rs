@@ -29,7 +29,7 @@ fn config(frame: FrameKind) -> UnetConfig {
 }
 
 /// A cylinder of random radius with a square hole.
-fn cylinder(rng: &mut ChaCha8Rng) -> TrainingSample {
+pub(super) fn cylinder(rng: &mut ChaCha8Rng) -> TrainingSample {
     let bend = rng.random_range(1.0..5.0f64);
     let size = rng.random_range(4..12usize);
     let truth = (0..CELLS)
@@ -311,12 +311,13 @@ fn the_engine_continues_from_weights_that_burn_has_trained() {
     ));
 }
 
-#[test]
-fn the_engine_learns_a_batch() {
+/// The loss of a batch before the first of 80 steps by the engine, and before the last.
+fn learned(optimiser: OptimiserKind) -> [f32; 2] {
     let dir = tempfile::tempdir().unwrap();
     let mut options = options(dir.path());
     let fresh = TrainSnapshot::fresh(&options).unwrap();
     options.from = Some(dir.path().to_owned());
+    options.optimiser = optimiser;
     let mut trainer = EngineTrainer::of(fresh, &options).unwrap();
     let generator = BatchGenerator {
         source: Arc::new(cylinders),
@@ -333,7 +334,20 @@ fn the_engine_learns_a_batch() {
     };
     let before = learn();
     let after = (0..80).map(|_| learn()).fold(f32::NAN, |_, loss| loss);
-    assert!(after < 0.95 * before, "{before} {after}");
+    // What a checkpoint keeps must be what it gives back, also where a moment is empty.
+    let snapshot = trainer.snapshot();
+    checkpoint::save(&snapshot, 1.0, &options, dir.path()).unwrap();
+    let (read, _) = checkpoint::load(&options, dir.path()).unwrap();
+    assert!(read.moments == snapshot.moments && read.network == snapshot.network);
+    [before, after]
+}
+
+#[test]
+fn the_engine_learns_a_batch() {
+    for optimiser in [OptimiserKind::Adamw, OptimiserKind::Muon] {
+        let [before, after] = learned(optimiser);
+        assert!(after < 0.95 * before, "{optimiser:?} {before} {after}");
+    }
 }
 
 #[test]
@@ -346,6 +360,14 @@ fn bad_options_are_refused_before_work() {
         },
         TrainOptions {
             minutes: f64::NAN,
+            ..options(dir.path())
+        },
+        TrainOptions {
+            optimiser: OptimiserKind::Muon,
+            ..options(dir.path())
+        },
+        TrainOptions {
+            teacher: Some(dir.path().to_owned()),
             ..options(dir.path())
         },
     ] {

@@ -11,7 +11,7 @@ use super::batch::{BatchGenerator, BatchPrefetcher, PreparedSample, prepare};
 use super::burn_trainer::input_fill;
 use super::checkpoint::{self, replace};
 use super::error::TrainError;
-use super::options::{RunStart, TrainOptions};
+use super::options::{OptimiserKind, RunStart, TrainOptions, TrainerKind};
 use super::progress::TrainProgress;
 use super::score::{HeldOutScores, Score, score};
 use super::snapshot::TrainSnapshot;
@@ -135,6 +135,12 @@ fn check(options: &TrainOptions) -> Result<(), TrainError> {
             "minutes, interval and learning rate must be positive".into(),
         ));
     }
+    let engines_own = options.optimiser == OptimiserKind::Muon || options.teacher.is_some();
+    if engines_own && options.trainer != TrainerKind::Engine {
+        return Err(TrainError::Options(
+            "only the engine's trainer has muon and a teacher".into(),
+        ));
+    }
     Ok(())
 }
 
@@ -166,11 +172,15 @@ fn write_weights(
             minutes: seconds / 60.0,
             data_seed,
             loss: format!(
-                "{:?} data + {} gradient + {} stretch + {} self-penetration",
+                "{:?} data + {} gradient + {} stretch + {} self-penetration{}",
                 options.loss.kind,
                 options.loss.gradient,
                 options.loss.stretch,
-                options.loss.self_penetration
+                options.loss.self_penetration,
+                match options.teacher {
+                    Some(_) => ", to the mean of a teacher's answers to eight symmetries",
+                    None => "",
+                }
             ),
         },
         scores: named_scores(scores),
