@@ -184,6 +184,48 @@ fn a_card_of_another_width_than_the_tensors_is_refused() {
     assert!(refused.contains("`last.weight`"), "{refused}");
 }
 
+/// A network's tensors in those of a wider one, whose other channels are zero.
+fn padded(narrow: &NamedTensors, wide: &UnetConfig) -> NamedTensors {
+    let padded = random_tensors(wide).into_iter().map(|(name, (shape, _))| {
+        let (old, values) = &narrow[&name];
+        let fill = f32::from(u8::from(name.ends_with(".variance")));
+        let mut all = vec![fill; shape.iter().product()];
+        let columns = |shape: &[usize]| shape.get(1).copied().unwrap_or(1);
+        let taps = shape.iter().skip(2).product::<usize>();
+        // A block after a skip reads two groups of channels, one behind the other.
+        let groups = 1 + usize::from(name.ends_with(".block.conv0.weight"));
+        let (each, old_each) = (columns(&shape) / groups, columns(old) / groups);
+        for (row, values) in values.chunks_exact(columns(old) * taps).enumerate() {
+            for (column, kernel) in values.chunks_exact(taps).enumerate() {
+                let column = column / old_each * each + column % old_each;
+                let at = (row * columns(&shape) + column) * taps;
+                all[at..at + taps].copy_from_slice(kernel);
+            }
+        }
+        (name, (shape, all))
+    });
+    padded.collect()
+}
+
+#[test]
+fn files_of_wider_networks_load_and_answer_as_the_network_inside() {
+    let narrow = UnetConfig {
+        width: 16,
+        ..CONFIG
+    };
+    let tensors = random_tensors(&narrow);
+    let grids = [bent(disk)];
+    let expected = filled(&random_network(narrow), &grids).unwrap();
+    for width in [24, 31] {
+        let wide = UnetConfig { width, ..narrow };
+        let bytes = write(&padded(&tensors, &wide), &card(wide)).unwrap();
+        assert!(bytes.len() <= 16 << 20, "{width}: {}", bytes.len());
+        let answer = filled(&load(&bytes).unwrap(), &grids).unwrap();
+        let gap = largest_distance(&answer[0], &expected[0]);
+        assert!(gap < 1e-3 * CELL, "{width}: {gap}");
+    }
+}
+
 #[test]
 fn a_value_that_is_not_finite_is_refused_on_reading() {
     let mut bytes = write(&random_tensors(&CONFIG), &card(CONFIG)).unwrap();
