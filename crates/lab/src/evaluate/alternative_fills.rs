@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::cases::EvaluationCase;
 use super::error::EvaluateError;
-use super::metrics::measure;
+use super::metrics::rmse;
 use super::patched::patched;
 use super::sweep::ObservedCase;
 use darn_geometry::grid::NormalGrid;
@@ -44,9 +44,9 @@ pub fn alternative_fills(
             let filled = observed.grid.filled(&answer, &observed.normalisation);
             let options = PatchOptions::default();
             let after = patched(&observed.grid, &case.sample.hole, &filled, &options);
-            found.filled.push(measure(case, &filled).metrics.rmse);
-            let rmse = |after: Vec<_>| measure(case, &after).metrics.rmse;
-            found.patched.push(after.map_or(f64::INFINITY, rmse));
+            found.filled.push(rmse(case, &filled));
+            let error = |after: Vec<_>| rmse(case, &after);
+            found.patched.push(after.map_or(f64::INFINITY, error));
         }
         Ok(found)
     };

@@ -9,6 +9,7 @@ use darn_geometry::mesh::intersect::intersections_with;
 use darn_geometry::mesh::{TriMesh, Vec3};
 
 use super::cases::EvaluationCase;
+use super::shaded_views::ShadedViews;
 use crate::cell_normals::{neighbours, normal};
 
 /// The metrics of one fill of one case.
@@ -28,6 +29,8 @@ pub struct FillMetrics {
     pub curvature: f64,
     /// Pairs of triangles that intersect, at least one of them touching the hole.
     pub self_intersections: f64,
+    /// Mean structural similarity (Wang et al. 2004) of six shaded pictures of the hole to those of the truth; 1 is equal.
+    pub ssim: f64,
 }
 
 /// The metrics of a fill, and the angle defects of its hole cells for histograms.
@@ -39,18 +42,19 @@ pub(super) struct Measurement {
     pub defects: Vec<f64>,
 }
 
-/// Measures a composed grid (known cells as observed, hole cells filled; one position per cell) against the truth of the case.
-pub(super) fn measure(case: &EvaluationCase, composed: &[Vec3]) -> Measurement {
+/// Measures a composed grid (known cells as observed, hole cells filled; one position per cell) against the truth of the case, and against pictures of
+/// it.
+pub(super) fn measure(
+    case: &EvaluationCase,
+    views: &ShadedViews,
+    composed: &[Vec3],
+) -> Measurement {
     let sample = &case.sample;
     let present: Vec<bool> = (0..CELLS)
         .map(|k| sample.known[k] || sample.hole[k])
         .collect();
     let open: Vec<usize> = (0..CELLS).filter(|&k| sample.hole[k]).collect();
     let truth: Vec<Vec3> = (0..CELLS).map(|k| case.truth(k)).collect();
-    let squares: f64 = open
-        .iter()
-        .map(|&k| (composed[k] - truth[k]).norm_squared())
-        .sum();
     let (mut angle, mut count, mut areas) = (0.0, 0usize, [0.0; 2]);
     for &k in &open {
         if let (Some(a), Some(b)) = (normal(composed, &present, k), normal(&truth, &present, k)) {
@@ -69,16 +73,26 @@ pub(super) fn measure(case: &EvaluationCase, composed: &[Vec3]) -> Measurement {
     let curvature = defects.iter().map(|d| d.abs()).sum::<f64>() / defects.len().max(1) as f64;
     Measurement {
         metrics: FillMetrics {
-            rmse: (squares / open.len().max(1) as f64).sqrt() * SIDE as f64,
+            rmse: rmse(case, composed),
             normal: angle / count.max(1) as f64,
             spacing_mean: mean,
             spacing_variance: variance,
             area: areas[0] / areas[1].max(f64::MIN_POSITIVE),
             curvature,
             self_intersections: self_intersections(composed, &present, &sample.hole) as f64,
+            ssim: views.similarity(composed),
         },
         defects,
     }
+}
+
+/// Root mean square distance to the truth over hole cells, in cells.
+pub(super) fn rmse(case: &EvaluationCase, composed: &[Vec3]) -> f64 {
+    let open = || (0..CELLS).filter(|&k| case.sample.hole[k]);
+    let squares: f64 = open()
+        .map(|k| (composed[k] - case.truth(k)).norm_squared())
+        .sum();
+    (squares / open().count().max(1) as f64).sqrt() * SIDE as f64
 }
 
 /// Angle defect of a cell: 2π minus the angles of the four triangles between it and its neighbours.

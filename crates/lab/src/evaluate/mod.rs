@@ -18,6 +18,7 @@ mod metrics;
 mod patched;
 mod report;
 mod scan_rows;
+mod shaded_views;
 mod surface_distance;
 mod sweep;
 mod wear;

@@ -133,6 +133,7 @@ impl EvaluationReport {
             area: of(|m| m.area),
             curvature: of(|m| m.curvature),
             self_intersections: of(|m| m.self_intersections),
+            ssim: of(|m| m.ssim),
         })
     }
 
@@ -162,8 +163,8 @@ impl EvaluationReport {
         let _ = writeln!(
             text,
             "{cases} samples, no noise; spacing of the truth: 1/64 = {:.6}\n\n\
-             | fill | | RMSE cells | normals deg | spacing mean | of 1/64 | spacing variance | area | abs. defect rad | from the truth's | cuts |\n\
-             |---|---|---|---|---|---|---|---|---|---|---|",
+             | fill | | RMSE cells | normals deg | spacing mean | of 1/64 | spacing variance | area | abs. defect rad | from the truth's | cuts | SSIM |\n\
+             |---|---|---|---|---|---|---|---|---|---|---|---|",
             1.0 / SIDE as f64
         );
         for (stage, fill) in stages() {
@@ -172,7 +173,7 @@ impl EvaluationReport {
             let Some(m) = self.mean(wanted) else { continue };
             let _ = writeln!(
                 text,
-                "| {} | {} | {:.3} | {:.2} | {:.6} | {:.4} | {:.2e} | {:.4} | {:.4} | {:.4} | {:.2} |",
+                "| {} | {} | {:.3} | {:.2} | {:.6} | {:.4} | {:.2e} | {:.4} | {:.4} | {:.4} | {:.2} | {:.3} |",
                 fill.name(),
                 stage.name(),
                 m.rmse,
@@ -183,7 +184,8 @@ impl EvaluationReport {
                 m.area,
                 m.curvature,
                 self.defect_distance(fill, stage),
-                m.self_intersections
+                m.self_intersections,
+                m.ssim
             );
         }
     }

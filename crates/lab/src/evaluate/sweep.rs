@@ -9,6 +9,7 @@ use super::patched::patched;
 use super::report::{
     AngleDefects, EvaluationReport, EvaluationRow, EvaluationStage, FillMethod, stages,
 };
+use super::shaded_views::ShadedViews;
 use darn_geometry::grid::{CELLS, Grid, NormalGrid, Normalisation};
 use darn_geometry::mesh::Vec3;
 use darn_geometry::patch::PatchOptions;
@@ -138,19 +139,20 @@ impl<'a> ObservedCase<'a> {
         options: &PatchOptions,
     ) -> Result<Vec<FillOutcome>, EvaluateError> {
         let hole = &self.case.sample.hole;
+        let views = ShadedViews::of(self.case);
         let mut all = Vec::new();
         for method in FillMethod::ALL {
             let filled = self.filled(method, answer)?;
             all.push(FillOutcome {
                 method,
                 stage: EvaluationStage::Filled,
-                measurement: Some(measure(self.case, &filled)),
+                measurement: Some(measure(self.case, &views, &filled)),
             });
             let patched = patched(&self.grid, hole, &filled, options).ok();
             all.push(FillOutcome {
                 method,
                 stage: EvaluationStage::Patched,
-                measurement: patched.map(|p| measure(self.case, &p)),
+                measurement: patched.map(|p| measure(self.case, &views, &p)),
             });
         }
         Ok(all)

@@ -3,8 +3,9 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::metrics::measure;
+use super::metrics::{Measurement, measure};
 use super::patched::patched;
+use super::shaded_views::ShadedViews;
 use super::*;
 use crate::scarffolds::masks::{self, MaskShape, SHAPES};
 use crate::scarffolds::samples::{SampleRotation, Sampler, TrainingSample};
@@ -34,6 +35,10 @@ fn case(surface: impl Fn(f64, f64) -> Vec3, shape: MaskShape, seed: u64) -> Eval
     }
 }
 
+fn measured(case: &EvaluationCase, composed: &[Vec3]) -> Measurement {
+    measure(case, &ShadedViews::of(case), composed)
+}
+
 fn plane(u: f64, v: f64) -> Vec3 {
     Vec3::new(0.6 * u, v, 0.8 * u)
 }
@@ -47,11 +52,12 @@ fn cylinder(u: f64, v: f64) -> Vec3 {
 fn the_truth_has_no_error_and_its_own_spacing() {
     for (shape, _) in SHAPES {
         let case = case(cylinder, shape, 4);
-        let found = measure(&case, &case.answer(&case.observed(0.0, 1)));
+        let found = measured(&case, &case.answer(&case.observed(0.0, 1)));
         let m = found.metrics;
         assert!(m.rmse < 1e-6 && m.normal < 1e-3, "{m:?}");
         assert!((m.spacing_mean * 64.0 - 1.0).abs() < 1e-3 && m.spacing_variance < 1e-10);
         assert!((m.area - 1.0).abs() < 1e-9 && m.self_intersections == 0.0);
+        assert!((m.ssim - 1.0).abs() < 1e-9, "{}", m.ssim);
         // A cylinder is developable: no defect beyond what f32 leaves.
         assert!(
             m.curvature < 1e-4 && !found.defects.is_empty(),
@@ -68,7 +74,26 @@ fn errors_are_in_cells() {
     for k in (0..CELLS).filter(|&k| case.sample.hole[k]) {
         answer[k] += Vec3::new(0.0, 0.0, 3.0 / SIDE as f64);
     }
-    assert!((measure(&case, &answer).metrics.rmse - 3.0).abs() < 1e-6);
+    assert!((measured(&case, &answer).metrics.rmse - 3.0).abs() < 1e-6);
+}
+
+#[test]
+fn pictures_of_folds_tell_flat_cloth_and_deeper_folds_from_the_truth() {
+    let folds = |depth: f64| move |u: f64, v: f64| Vec3::new(u, v, depth * (30.0 * u).sin());
+    let truth = case(folds(0.03), MaskShape::Circle, 2);
+    // Hole cells of another surface, known cells of the truth.
+    let similarity = |depth: f64| {
+        let mut answer = truth.answer(&truth.observed(0.0, 1));
+        for k in (0..CELLS).filter(|&k| truth.sample.hole[k]) {
+            let uv = cell_centre(k);
+            answer[k] = folds(depth)(uv.x, uv.y);
+        }
+        measured(&truth, &answer).metrics.ssim
+    };
+    let [flat, shallow, right, deep] = [0.0, 0.024, 0.03, 0.036].map(similarity);
+    assert!((right - 1.0).abs() < 1e-9, "{right}");
+    assert!(shallow > 0.9 && deep > 0.9, "{shallow} {deep}");
+    assert!(flat < 0.8 && similarity(-0.03) < 0.8, "{flat}");
 }
 
 #[test]
@@ -80,7 +105,7 @@ fn cloth_through_cloth_is_counted() {
     // One cell is pulled through the sheet some cells further on.
     answer[middle] = case.truth(middle + 8) - away * 0.01;
     answer[middle + 1] = case.truth(middle + 8) + away * 0.01;
-    assert!(measure(&case, &answer).metrics.self_intersections > 0.0);
+    assert!(measured(&case, &answer).metrics.self_intersections > 0.0);
 }
 
 #[test]
@@ -88,7 +113,7 @@ fn both_smooth_fills_keep_a_plane_and_only_the_plate_keeps_a_bend() {
     let worst = |case: &EvaluationCase, energy| {
         let seen = case.observed(0.0, 1);
         let filled = smooth(&seen.positions, &seen.known, &case.sample.hole, energy, 1).unwrap();
-        measure(case, &filled).metrics.rmse
+        measured(case, &filled).metrics.rmse
     };
     let parabola = |u: f64, v: f64| Vec3::new(u, v, (u - 0.5) * (v - 0.5));
     for shape in [MaskShape::Circle, MaskShape::Percolation, MaskShape::Ring] {

@@ -1,6 +1,7 @@
 //! How near a picture of a hole comes to the truth.
 
 use super::fabric::Swatch;
+use super::ssim::{LightPair, window};
 
 /// A picture of the patch beside the truth.
 pub struct Comparison<'a> {
@@ -47,43 +48,18 @@ impl Comparison<'_> {
             .collect();
         let light = |all: &[[f64; 3]]| all.iter().map(|c| c[0]).collect::<Vec<f64>>();
         let (made, truth) = (light(&made), light(&truth));
+        let pair = LightPair {
+            width: self.width,
+            made: &made,
+            truth: &truth,
+        };
         Scores {
             delta_e: differences.iter().sum::<f64>() / count,
             within_10: differences.iter().filter(|d| **d <= 10.0).count() as f64 / count,
-            ssim: texels
-                .iter()
-                .map(|at| self.ssim(*at, &made, &truth))
-                .sum::<f64>()
-                / count,
+            ssim: texels.iter().map(|at| pair.ssim(*at)).sum::<f64>() / count,
             seam: self.seam(&made) / self.seam(&truth).max(1e-9),
             phase: self.phase(&made, &truth, phases),
         }
-    }
-
-    fn window(&self, at: usize, reach: i64) -> impl Iterator<Item = usize> + '_ {
-        let (width, height) = (self.width as i64, (self.hole.len() / self.width) as i64);
-        let (c, r) = ((at % self.width) as i64, (at / self.width) as i64);
-        (r - reach..=r + reach)
-            .flat_map(move |y| (c - reach..=c + reach).map(move |x| (x, y)))
-            .filter(move |(x, y)| *x >= 0 && *y >= 0 && *x < width && *y < height)
-            .map(move |(x, y)| (y * width + x) as usize)
-    }
-
-    fn ssim(&self, at: usize, made: &[f64], truth: &[f64]) -> f64 {
-        let (mut n, mut a, mut b, mut aa, mut bb, mut ab) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-        for k in self.window(at, 3) {
-            let (x, y) = (made[k], truth[k]);
-            n += 1.0;
-            a += x;
-            b += y;
-            aa += x * x;
-            bb += y * y;
-            ab += x * y;
-        }
-        let (a, b) = (a / n, b / n);
-        let (va, vb, cov) = (aa / n - a * a, bb / n - b * b, ab / n - a * b);
-        let (c1, c2) = (1.0, 9.0);
-        (2.0 * a * b + c1) * (2.0 * cov + c2) / ((a * a + b * b + c1) * (va + vb + c2))
     }
 
     fn seam(&self, light: &[f64]) -> f64 {
@@ -108,8 +84,9 @@ impl Comparison<'_> {
         if phases.periods == [0.0; 2] {
             return f64::NAN;
         }
+        let near = |at: usize| window(self.width, self.hole.len(), at, 10);
         let near: Vec<usize> = (0..self.hole.len())
-            .filter(|at| self.hole[*at] && self.window(*at, 10).any(|k| self.known[k]))
+            .filter(|at| self.hole[*at] && near(*at).any(|k| self.known[k]))
             .collect();
         let (width, height) = (self.width as i64, (self.hole.len() / self.width) as i64);
         let cost = |[dx, dy]: [i64; 2]| {

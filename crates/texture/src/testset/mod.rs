@@ -6,12 +6,14 @@ mod fabric;
 mod metrics;
 mod peers;
 mod scan;
+mod ssim;
 
 pub use draw::Family;
 pub use fabric::{FABRICS, Fabric, Swatch};
 pub use metrics::{Comparison, Phases, Scores, ciede2000, lab};
 pub use peers::{Peer, continued};
 pub use scan::{HOLES, LAYOUTS, Layout, TestScan};
+pub use ssim::LightPair;
 
 use darn_budget::Budget;
 
