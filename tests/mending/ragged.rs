@@ -220,6 +220,30 @@ fn a_patch_meets_an_island_that_has_a_hole_of_its_own() {
 }
 
 #[test]
+fn scraps_within_a_hole_are_no_cuts_of_its_patch() {
+    let keep = |u: f64, v: f64| (u - 0.5).hypot(v - 0.5) > 0.18;
+    for fold in [0.0, 0.03] {
+        let mut littered = sheet(24, keep, |u, v| Vec3::new(u, v, fold * (7.0 * u).sin()));
+        for k in 0..8 {
+            let angle = std::f64::consts::TAU * f64::from(k) / 8.0;
+            let middle = Vec3::new(0.5 + 0.1 * angle.cos(), 0.5 + 0.1 * angle.sin(), 0.0);
+            let tilt = Vec3::new(0.02, 0.0, 0.01 * f64::from(k % 3 - 1));
+            let first = littered.positions.len() as u32;
+            let corners = [middle - tilt, middle + tilt, middle + Vec3::y() * 0.04];
+            littered.positions.extend(corners);
+            littered.faces.push([first, first + 1, first + 2]);
+        }
+        let (report, after) = mend(&littered);
+        let patch = report.patch.as_ref().expect("a patch");
+        assert_eq!(
+            (patch.self_intersections, patch.method.as_str()),
+            (0, "network")
+        );
+        assert_eq!(after.topology.components, 9);
+    }
+}
+
+#[test]
 fn scraps_that_float_beside_the_cloth_are_told_of() {
     let keep = |u: f64, v: f64| (u - 0.5).hypot(v - 0.5) > 0.18;
     let cloth = sheet(36, keep, |u, v| Vec3::new(u, v, 0.0));

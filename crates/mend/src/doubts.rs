@@ -22,8 +22,7 @@ const MOST_STRETCH: f64 = 2.5;
 /// Mean of these from which on the patch is absurd: its chart has far too little cloth for the hole. On 70 holes in garments, sound
 /// patches have up to 1.14.
 const MOST_MEAN_STRETCH: f64 = 1.3;
-/// Pairs of triangles that cut each other, per triangle of the patch, from which on the patch is absurd. A scrap that floats in a hole is cut by 6 % of
-/// the patch's triangles, a tent over a frayed rim cuts itself in 24 %.
+/// Pairs of triangles that cut each other, per triangle of the patch, from which on the patch is absurd. A tent over a frayed rim cuts itself in 24 %.
 /// On 149 scans with sound holes, patches are cut by up to 3.4 %, where crumpled cloth is noisy.
 const MOST_CUTS: f64 = 0.04;
 /// The same of a fair surface, which has no folds that could touch: up to 0.8 % there; one that fills a torn sheet's outside has 3.5 %.

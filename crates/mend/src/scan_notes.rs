@@ -2,7 +2,7 @@
 
 use darn_contract::{excerpt, v1};
 use darn_geometry::mesh::index::{FaceId, VertexId};
-use darn_geometry::misfit::FEWEST_FACES;
+use darn_geometry::mesh::layers::FEWEST_FACES;
 use darn_gltf_scan::{NamedPlace, Scan};
 
 use crate::welded_scan::WeldedScan;

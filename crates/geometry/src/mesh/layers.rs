@@ -6,7 +6,11 @@ use super::blocks::FaceBlocks;
 use super::bounds::Bounds;
 use super::index::{FaceId, VertexId};
 use super::region::{BoundedMesh, Region};
+use super::topology::Topology;
 use super::{TriMesh, Vec3};
+
+/// Pieces of fewer faces are scraps: they say nothing of the cloth.
+pub const FEWEST_FACES: usize = 8;
 
 /// Faces near a hole, outside its region.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -21,7 +25,7 @@ impl Layers {
     /// The faces outside `region` whose bounding boxes come within `margin` (scene units) of the rim's. `blocks` are those of
     /// the whole mesh.
     ///
-    /// A face with a vertex on the rim is left out: it touches the patch there and does not cut it. So are the faces `left`:
+    /// A face with a vertex on the rim is left out: it touches the patch there and does not cut it. So are the faces `left` and scraps:
     /// they are no cloth, and may lie where the cloth was.
     pub fn near(
         whole: &BoundedMesh,
@@ -44,6 +48,7 @@ impl Layers {
             Bounds::of_face(mesh, *face).is_some_and(|b| b.meets(&place))
                 && !own.contains(&FaceId(*face as u32))
                 && !mesh.faces[*face].iter().any(touches)
+                && !is_scrap(topology, FaceId(*face as u32))
         };
         let near: Vec<usize> = blocks.near(&place).filter(is_near).collect();
         let component = |face: usize| topology.component(FaceId(face as u32));
@@ -57,6 +62,23 @@ impl Layers {
     }
 }
 
+/// Whether the piece that a face belongs to has fewer than [`FEWEST_FACES`] faces.
+fn is_scrap(topology: &Topology, face: FaceId) -> bool {
+    let mut piece = vec![face];
+    let mut seen = 0;
+    while let Some(face) = piece.get(seen).copied() {
+        seen += 1;
+        for half_edge in face.half_edges() {
+            let next = topology.twin(half_edge).map(|twin| twin.face());
+            piece.extend(next.filter(|next| !piece.contains(next)));
+        }
+        if piece.len() >= FEWEST_FACES {
+            return false;
+        }
+    }
+    true
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -65,6 +87,33 @@ mod tests {
     use crate::mesh::shapes::{concat, sheet};
     use crate::mesh::topology::Topology;
     use crate::mesh::weld::weld;
+
+    #[test]
+    fn scraps_are_no_layer_and_larger_pieces_are() {
+        let keep = |u: f64, v: f64| (u - 0.5).hypot(v - 0.5) > 0.1;
+        let holed = sheet(30, keep, |u, v| Vec3::new(u, v, 0.0));
+        for faces in (2..=12).step_by(2) {
+            let strip = sheet(
+                12,
+                |_, v| v < 1.0 / 12.0,
+                |u, v| Vec3::new(0.45 + 0.1 * u, 0.45 + v, 0.01),
+            );
+            let mut piece = strip;
+            piece.faces.truncate(faces);
+            let mesh = weld(&concat(&holed, &piece)).mesh;
+            let topology = Topology::new(&mesh);
+            let loops = boundary_loops(&mesh, &topology);
+            let whole = BoundedMesh {
+                mesh: &mesh,
+                topology: &topology,
+                loops: &loops,
+            };
+            let region = region_around_hole(&mesh, 0.2);
+            let near = Layers::near(&whole, &FaceBlocks::new(&mesh), &region, 0.06, &[]);
+            let expected = if faces < FEWEST_FACES { 0 } else { faces };
+            assert_eq!(near.mesh.faces.len(), expected);
+        }
+    }
 
     #[test]
     fn a_second_layer_is_near_and_the_rest_of_the_sheet_is_far() {

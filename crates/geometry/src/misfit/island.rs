@@ -11,12 +11,11 @@ use rstar::primitives::GeomWithData;
 use crate::flatten::Chart;
 use crate::grid::{SIDE, cell_centre};
 use crate::mesh::curvature::vertex_normals;
+use crate::mesh::layers::FEWEST_FACES;
 use crate::mesh::region::Region;
 use crate::mesh::{Vec2, Vec3};
 use crate::patch::{Outline, across};
 
-/// Pieces of fewer faces are scraps: they say nothing of the cloth.
-pub const FEWEST_FACES: usize = 8;
 /// Largest mean distance of an island from the fill ÷ its extent.
 const FAR: f64 = 0.2;
 /// Least mean cosine of the angle between the normals of an island and of the fill.

@@ -8,6 +8,6 @@ mod smooth_sheet;
 mod standing;
 
 pub use flaps::flaps;
-pub use island::{FEWEST_FACES, FilledChart, place_island};
+pub use island::{FilledChart, place_island};
 pub use overlap::overlapping_lip;
 pub use standing::{lies_flat, standing_pieces, stands_out};
