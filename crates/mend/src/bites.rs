@@ -21,8 +21,8 @@ const LONGEST: f64 = 0.55;
 const LEAST_DETOUR: f64 = 1.2;
 /// Least depth of a bite, in mean edges of its loop.
 pub const LEAST_DEPTH: f64 = 3.0;
-/// A bite ends where its line is less than this many times as long as the hem across it would be: above [`LARGEST_WAVE`](crate::flat_line), so that a
-/// wavy hem is no part of it.
+/// A bite ends where its line is less than this many times as long as the hem across it would be: more than a smooth hem's waves make it, so that a wavy
+/// hem is no part of it.
 const DETOUR: f64 = 1.15;
 /// How the hems beside a bite may run: less hem has to be straighter.
 const HEMS: [HemRule; 4] = [

@@ -31,6 +31,7 @@ pub struct FlatLine {
 }
 
 impl FlatLine {
+    /// Lays a loop flat. O(n).
     pub fn of(mesh: &TriMesh, topology: &Topology, rim: &BoundaryLoop) -> FlatLine {
         let n = rim.vertices.len();
         let at = |k: usize| mesh.positions[rim.vertices[k % n].index()];

@@ -110,8 +110,8 @@ pub(super) fn verdicts(
     topology: &Topology,
     loops: &[BoundaryLoop],
 ) -> Vec<Option<Verdict>> {
-    let bounds_tube = |l: &BoundaryLoop| l.kind == LoopKind::TubeEnd;
-    if !loops.iter().any(|l| may_be_hole(l) || bounds_tube(l)) {
+    let in_question = |l: &BoundaryLoop| matches!(l.kind, LoopKind::Hole | LoopKind::TubeEnd);
+    if !loops.iter().any(in_question) {
         return vec![None; loops.len()];
     }
     let areas = component_areas(mesh, topology);

@@ -44,7 +44,7 @@ pub struct SampleStream {
 }
 
 impl SampleStream {
-    /// Writes the records of [`sample_records`]; ends early, without an error, when `out` is a closed pipe.
+    /// Writes the records of `sample_records`; ends early, without an error, when `out` is a closed pipe.
     ///
     /// # Errors
     /// Sheets that cannot be read, an output that cannot be written.
