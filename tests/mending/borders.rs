@@ -308,7 +308,7 @@ fn bag(keep: impl Fn(f64, f64) -> bool) -> TriMesh {
 
 #[test]
 fn an_opening_with_a_rip_stays_open_and_the_rip_is_mended_named_or_found() {
-    for depth in [0.15, 0.3] {
+    for depth in [0.15, 0.25, 0.3] {
         let ripped = bag(|u, v| (u - 0.5).abs() * 48.0 > 1.0 || v > depth);
         let bytes = packed(&ripped, &[]);
         let error = mended(&bytes, &Constraints::default()).unwrap_err();
@@ -329,7 +329,7 @@ fn an_opening_with_a_rip_stays_open_and_the_rip_is_mended_named_or_found() {
         for border in [named, Border::Auto] {
             let answer = mended(&bytes, &asking(border)).unwrap();
             let share = MendedScan::of(&answer.bytes).patch_area() / lost;
-            assert!((0.7..1.3).contains(&share), "{depth}: {share}");
+            assert!((0.8..1.2).contains(&share), "{depth}: {share}");
         }
     }
 }
