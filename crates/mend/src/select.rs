@@ -12,7 +12,7 @@ use darn_budget::Budget;
 use darn_contract::{Anchor, Constraints, Edit, FieldError, Fill, HoleSelector, error_chain, v1};
 use darn_geometry::mesh::Vec3;
 use darn_geometry::mesh::loops::{BoundaryLoop, LoopKind};
-use darn_geometry::mesh::openings::{Evidence, EvidenceKind};
+use darn_geometry::mesh::openings::Evidence;
 use darn_gltf_scan::Scan;
 
 /// Which loops are filled with which constraints, and which are left.
@@ -282,12 +282,6 @@ fn with_bites(mut skipped: Vec<v1::Skipped>, bites: &[(&BoundaryLoop, Bite)]) ->
     skipped
 }
 
-/// Whether a loop's rim is torn where the piece's other edges are finished.
-fn is_torn(rim: &BoundaryLoop) -> bool {
-    let speaks_for_a_hole = |e: &Evidence| e.kind == EvidenceKind::Rim && e.weight < 0.0;
-    rim.evidence.iter().any(speaks_for_a_hole)
-}
-
 /// Why a loop is left as it is when no selector names it; `None` for one that the request fills.
 fn reason_to_skip(
     scan: &Scan,
@@ -303,13 +297,14 @@ fn reason_to_skip(
     if rim.vertices.is_empty() {
         return SkipReason::new("cut_away", CUT_AWAY);
     }
+    let is_torn = rim.evidence.iter().any(Evidence::is_torn_rim);
     match (rim.kind, fill) {
         (LoopKind::Outer, _) => {
             let phrase = "the cloth's own edge, the outer boundary; name it to fill it";
             return SkipReason::new("outer_boundary", phrase);
         }
         (LoopKind::TubeEnd, Some(Fill::Holes) | None) => {
-            let phrase = if is_torn(rim) {
+            let phrase = if is_torn {
                 "the end of a tube, such as a sleeve, but torn where the piece's other edges are finished; if it is a hole, name it to fill it"
             } else {
                 "the end of a tube, such as a sleeve; name it to fill it"
@@ -317,7 +312,7 @@ fn reason_to_skip(
             return SkipReason::new("tube_end", phrase);
         }
         (LoopKind::Opening, Some(Fill::Holes) | None) => {
-            let phrase = if is_torn(rim) {
+            let phrase = if is_torn {
                 "an opening, such as a neck, but torn where the piece's other edges are finished; if it is a hole, name it to fill it"
             } else {
                 "an opening, such as a neck; name it to fill it"

@@ -25,6 +25,24 @@ const MOST_HEM: f64 = 0.1;
 /// Largest ratio of length to chord of the hems.
 const STRAIGHT: f64 = 1.03;
 
+/// A corner that the piece still has.
+struct WholeCorner {
+    /// Its vertex, in the first round of the line.
+    vertex: usize,
+    /// The angle between its hems, radians.
+    angle: f64,
+}
+
+/// The end of a hem beside a torn corner.
+struct TornHem {
+    /// Its last vertex, in the line.
+    vertex: usize,
+    /// From there away from the corner, along the loop (1) or against it (−1).
+    way: f64,
+    /// How far it is to the corner, scene units.
+    prolonged: f64,
+}
+
 /// The torn corners of an outer boundary, the tightest first; they may overlap.
 ///
 /// # Errors
@@ -42,7 +60,7 @@ pub fn torn_corners(
     steps.take(PAIR_WORK * line.vertices as u64)?;
     let reach = LEAST_HEM * line.length;
     let whole = whole_corners(line, reach);
-    let angles = || whole.iter().map(|(_, angle)| *angle);
+    let angles = || whole.iter().map(|corner| corner.angle);
     let usual = angles().sum::<f64>() / whole.len().max(1) as f64;
     if whole.len() < FEWEST || angles().any(|angle| (angle - usual).abs() > ALIKE) {
         return Ok(Vec::new());
@@ -58,10 +76,10 @@ pub fn torn_corners(
         for (to, second) in after.iter().enumerate().take(from + count).skip(from + 1) {
             steps.take(PAIR_WORK)?;
             let stretch = from..to;
-            let has_whole = |(vertex, _): &(usize, f64)| {
+            let has_whole = |whole: &WholeCorner| {
                 let (first, last) = (line.sample(from), line.sample(to));
-                let round = (first - vertex).div_ceil(line.vertices);
-                vertex + round * line.vertices <= last
+                let round = (first - whole.vertex).div_ceil(line.vertices);
+                whole.vertex + round * line.vertices <= last
             };
             if line.length_of(&stretch) > LONGEST * line.length || whole.iter().any(has_whole) {
                 break;
@@ -83,24 +101,29 @@ fn angle(first: &Vec2, second: &Vec2) -> f64 {
     first.perp(second).atan2(first.dot(second))
 }
 
-/// The vertices at the piece's corners, below the line's number of vertices, with their angles: of those within `reach` of each other the sharpest.
-fn whole_corners(line: &FlatLine, reach: f64) -> Vec<(usize, f64)> {
+/// The piece's corners: of those within `reach` of each other the sharpest.
+fn whole_corners(line: &FlatLine, reach: f64) -> Vec<WholeCorner> {
     let n = line.vertices;
     let sharp = |vertex: usize| {
         let hem = |reach: f64| line.hem_within(vertex + n, reach, STRAIGHT);
         let angle = angle(&hem(-reach)?, &hem(reach)?);
-        CORNER.contains(&angle).then_some((vertex, angle))
+        CORNER
+            .contains(&angle)
+            .then_some(WholeCorner { vertex, angle })
     };
-    let mut all: Vec<(usize, f64)> = (0..n).filter_map(sharp).collect();
-    all.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    let mut apart: Vec<(usize, f64)> = Vec::new();
-    for (vertex, angle) in all {
-        let near = |(other, _): &(usize, f64)| {
-            let between = (line.places[vertex].1 - line.places[*other].1).abs();
+    let mut all: Vec<WholeCorner> = (0..n).filter_map(sharp).collect();
+    all.sort_by(|a, b| {
+        let sharper = b.angle.total_cmp(&a.angle);
+        sharper.then(a.vertex.cmp(&b.vertex))
+    });
+    let mut apart: Vec<WholeCorner> = Vec::new();
+    for corner in all {
+        let near = |other: &WholeCorner| {
+            let between = (line.places[corner.vertex].1 - line.places[other.vertex].1).abs();
             between.min(line.length - between) < reach
         };
         if !apart.iter().any(near) {
-            apart.push((vertex, angle));
+            apart.push(corner);
         }
     }
     apart
@@ -138,29 +161,31 @@ fn bite(
     let middle = (second - first).try_normalize(0.0)?;
     let depth = places().map(|p| middle.dot(&(p - corner)));
     let n = line.vertices;
+    let hem = |vertex, way, prolonged| TornHem {
+        vertex,
+        way,
+        prolonged,
+    };
+    let hems = [hem(from, -1.0, on), hem(to, 1.0, back)];
     Some(Bite {
         from: from % n,
         to: to % n,
         length: line.length_of(&stretch),
         mouth: gap.norm(),
         depth: depth.fold(0.0, f64::max),
-        corner: Some(prolonged_to(line, mesh, rim, [(from, on), (to, back)])),
+        corner: Some(prolonged_to(line, mesh, rim, &hems)),
     })
 }
 
 /// Where the hems meet in the scene: each prolonged as it runs there over as much of its length, so that a fold beside the tear does not count for
 /// all of it, and the middle of both.
-fn prolonged_to(
-    line: &FlatLine,
-    mesh: &TriMesh,
-    rim: &BoundaryLoop,
-    ends: [(usize, f64); 2],
-) -> Vec3 {
+fn prolonged_to(line: &FlatLine, mesh: &TriMesh, rim: &BoundaryLoop, hems: &[TornHem; 2]) -> Vec3 {
     let at = |k: usize| mesh.positions[rim.vertices[k % line.vertices].index()];
-    let [from, to] = [(ends[0], -1.0), (ends[1], 1.0)].map(|((k, by), way)| {
-        let reach = by.clamp(LEAST_HEM * line.length, MOST_HEM * line.length);
-        let hem = at(k) - at(line.vertex_after(k, way * reach));
-        at(k) + hem.try_normalize(0.0).unwrap_or_default() * by
+    let [from, to] = hems.each_ref().map(|hem| {
+        let reach = (hem.prolonged).clamp(LEAST_HEM * line.length, MOST_HEM * line.length);
+        let end = at(hem.vertex);
+        let along = end - at(line.vertex_after(hem.vertex, hem.way * reach));
+        end + along.try_normalize(0.0).unwrap_or_default() * hem.prolonged
     });
     (from + to) * 0.5
 }

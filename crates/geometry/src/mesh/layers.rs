@@ -88,6 +88,17 @@ mod tests {
     use crate::mesh::topology::Topology;
     use crate::mesh::weld::weld;
 
+    fn near_within(mesh: &TriMesh, region: &Region, margin: f64) -> Layers {
+        let topology = Topology::new(mesh);
+        let loops = boundary_loops(mesh, &topology);
+        let whole = BoundedMesh {
+            mesh,
+            topology: &topology,
+            loops: &loops,
+        };
+        Layers::near(&whole, &FaceBlocks::new(mesh), region, margin, &[])
+    }
+
     #[test]
     fn scraps_are_no_layer_and_larger_pieces_are() {
         let keep = |u: f64, v: f64| (u - 0.5).hypot(v - 0.5) > 0.1;
@@ -101,15 +112,7 @@ mod tests {
             let mut piece = strip;
             piece.faces.truncate(faces);
             let mesh = weld(&concat(&holed, &piece)).mesh;
-            let topology = Topology::new(&mesh);
-            let loops = boundary_loops(&mesh, &topology);
-            let whole = BoundedMesh {
-                mesh: &mesh,
-                topology: &topology,
-                loops: &loops,
-            };
-            let region = region_around_hole(&mesh, 0.2);
-            let near = Layers::near(&whole, &FaceBlocks::new(&mesh), &region, 0.06, &[]);
+            let near = near_within(&mesh, &region_around_hole(&mesh, 0.2), 0.06);
             let expected = if faces < FEWEST_FACES { 0 } else { faces };
             assert_eq!(near.mesh.faces.len(), expected);
         }
@@ -121,18 +124,10 @@ mod tests {
         let holed = sheet(30, keep, |u, v| Vec3::new(u, v, 0.0));
         let layer = sheet(30, |_, _| true, |u, v| Vec3::new(u, v, 0.05));
         let mesh = weld(&concat(&holed, &layer)).mesh;
-        let topology = Topology::new(&mesh);
-        let loops = boundary_loops(&mesh, &topology);
-        let whole = BoundedMesh {
-            mesh: &mesh,
-            topology: &topology,
-            loops: &loops,
-        };
-        let blocks = FaceBlocks::new(&mesh);
         let region = region_around_hole(&mesh, 0.2);
         assert!(region.faces.len() < holed.faces.len());
 
-        let near = Layers::near(&whole, &blocks, &region, 0.06, &[]);
+        let near = near_within(&mesh, &region, 0.06);
         let above = |p: &&Vec3| p.z > 0.0;
         assert!(!near.mesh.faces.is_empty());
         assert_eq!(
@@ -143,7 +138,7 @@ mod tests {
             (near.mesh.positions.iter()).all(|p| (p.xy() - Vec3::repeat(0.5).xy()).amax() < 0.25)
         );
         assert_eq!(near.other, vec![Some(1); near.mesh.faces.len()]);
-        let nearer = Layers::near(&whole, &blocks, &region, 0.04, &[]);
+        let nearer = near_within(&mesh, &region, 0.04);
         assert_eq!(nearer.mesh.faces, [[0; 3]; 0]);
     }
 }

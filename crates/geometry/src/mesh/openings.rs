@@ -182,23 +182,24 @@ impl Verdict {
 
     /// Of a loop that turns like a tube's end; `None` where nothing says otherwise.
     fn of_tube_end(evidence: Vec<Evidence>, may_be_hole: bool) -> Option<Verdict> {
-        let torn = |e: &Evidence| e.kind == EvidenceKind::Rim && e.weight < 0.0;
-        if !may_be_hole && !evidence.iter().any(torn) {
+        if !may_be_hole && !evidence.iter().any(Evidence::is_torn_rim) {
             return None;
         }
         let verdict = Verdict::of(evidence);
-        Some(match (verdict.kind, may_be_hole) {
-            (LoopKind::Hole, true) => verdict,
-            // Its turning and the rest of the evidence contradict each other.
-            (LoopKind::Hole, false) => Verdict {
-                kind: LoopKind::TubeEnd,
-                confidence: 0.5,
-                ..verdict
-            },
-            _ => Verdict {
+        if verdict.kind != LoopKind::Hole {
+            return Some(Verdict {
                 kind: LoopKind::TubeEnd,
                 ..verdict
-            },
+            });
+        }
+        if may_be_hole {
+            return Some(verdict);
+        }
+        // Its turning and the rest of the evidence contradict each other.
+        Some(Verdict {
+            kind: LoopKind::TubeEnd,
+            confidence: 0.5,
+            ..verdict
         })
     }
 }
@@ -326,6 +327,11 @@ impl EvidenceKind {
 }
 
 impl Evidence {
+    /// Whether it says that the rim is torn where the piece's other edges are finished.
+    pub fn is_torn_rim(&self) -> bool {
+        self.kind == EvidenceKind::Rim && self.weight < 0.0
+    }
+
     /// What was found, for a person.
     pub fn reason(&self) -> String {
         let value = self.value;

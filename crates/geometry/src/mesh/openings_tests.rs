@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::index::FaceId;
 use super::loops::{BoundaryLoop, LoopKind, boundary_loops};
-use super::openings::{EvidenceKind, PRIOR, SUREST};
+use super::openings::{Evidence, PRIOR, SUREST};
 use super::pairing::Paired;
 use super::shapes::{jitter, sheet, tube};
 use super::topology::Topology;
@@ -142,7 +142,7 @@ proptest! {
         let ends: Vec<f64> = (0..n).map(|_| depth * rng.random_range(0.0..1.0)).collect();
         let torn = |u: f64, v: f64| v > ends[(u * n as f64) as usize % n];
         let loops = loops_of(&tube(n, torn));
-        let doubtful = |l: &BoundaryLoop| l.confidence < 1.0 && l.evidence.iter().any(|e| e.kind == EvidenceKind::Rim && e.weight < 0.0);
+        let doubtful = |l: &BoundaryLoop| l.confidence < 1.0 && l.evidence.iter().any(Evidence::is_torn_rim);
         let mut found: Vec<(LoopKind, bool)> = (loops.iter().filter(|l| l.vertices.len() > 12)).map(|l| (l.kind, doubtful(l))).collect();
         found.sort_unstable_by_key(|f| f.1);
         prop_assert_eq!(found, [(LoopKind::TubeEnd, false), (LoopKind::TubeEnd, true)]);
